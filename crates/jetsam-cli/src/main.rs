@@ -1,0 +1,2 @@
+//! The `jetsam` command.
+fn main() {}

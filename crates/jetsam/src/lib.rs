@@ -1,0 +1,2 @@
+//! **jetsam** drops meshes into water.
+#![forbid(unsafe_op_in_unsafe_fn)]
