@@ -1,2 +1,21 @@
 //! **jetsam** drops meshes into water.
-#![forbid(unsafe_op_in_unsafe_fn)]
+pub mod assemble;
+pub mod backend;
+pub mod error;
+pub mod integrate;
+pub mod interact;
+pub mod laws;
+pub mod ledger;
+pub mod mesh;
+pub mod model;
+pub mod params;
+pub mod random;
+pub mod scene;
+pub mod stage;
+pub mod state;
+pub mod voxelize;
+pub mod world;
+
+pub use error::{Error, Result};
+pub use scene::Scene;
+pub use world::{StepReport, World};

@@ -1,0 +1,423 @@
+//! The CPU: threads by rayon, wide instructions chosen at run time.
+//!
+//! Work is cut into chunks of fixed size whose results do not depend on who computes them, and sums over chunks
+//! are made in their order: the same bits for any number of threads.
+
+use super::Backend;
+use crate::integrate::{Advance, bodies, particles};
+use crate::interact::cells::{Cells, Grid};
+use crate::interact::neighbours::{Around, NeighbourChunk};
+use crate::interact::{CHUNK, boundary, density, forces, pressure};
+use crate::ledger::Ledger;
+use crate::model::Model;
+use crate::stage::Stage;
+use crate::state::{Kind, Record, State};
+use fearless_simd::{Level, dispatch};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// The CPU backend.
+pub struct Cpu {
+    level: Level,
+    state: State,
+    cells: [Cells; Kind::COUNT],
+    neighbours: [Vec<NeighbourChunk>; Kind::COUNT],
+    /// The other half of the double buffers of `cells`.
+    spare: Spare,
+    /// Where the particle of each rigid or static slot stands.
+    place: Vec<AtomicU32>,
+    share: Vec<f32>,
+    parts: Vec<bodies::Part>,
+    particle_mass: Vec<f32>,
+    sums: Vec<Ledger>,
+    ledger: Ledger,
+    static_copies: u32,
+}
+
+/// Arrays that `cells` writes while it reads their twins.
+#[derive(Default)]
+struct Spare {
+    record: Vec<Record>,
+    id: Vec<u32>,
+    owner: Vec<u32>,
+}
+
+impl Default for Cpu {
+    fn default() -> Self {
+        Self {
+            level: Level::new(),
+            state: State::default(),
+            cells: Default::default(),
+            neighbours: Default::default(),
+            spare: Spare::default(),
+            place: Vec::new(),
+            share: Vec::new(),
+            parts: Vec::new(),
+            particle_mass: Vec::new(),
+            sums: Vec::new(),
+            ledger: Ledger::default(),
+            static_copies: 0,
+        }
+    }
+}
+
+impl Backend for Cpu {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn upload(&mut self, state: State) {
+        let p = &state.particles;
+        self.spare = Spare { record: p.record.clone(), id: p.id.clone(), owner: p.owner.clone() };
+        self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
+        self.share = vec![0.0; state.particles.record.len()];
+        self.parts = bodies::parts(&state.bodies.body);
+        self.particle_mass =
+            state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
+        self.ledger = Ledger::default();
+        self.static_copies = 0;
+        self.state = state;
+    }
+
+    fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
+        match stage {
+            Stage::Drift => self.drift(model, advance),
+            Stage::Cells => self.sort(&model.grid),
+            Stage::Density => self.density(model),
+            Stage::Pressure => self.pressure(model),
+            Stage::Boundary => self.boundary(model),
+            Stage::Forces => self.forces(model),
+            Stage::Bodies => self.bodies(model),
+            Stage::Kick => self.kick(model, advance),
+            Stage::Ledger => self.tally(model),
+        }
+    }
+
+    fn download(&self) -> &State {
+        &self.state
+    }
+
+    fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+}
+
+/// Place of a body's particle that is outside the domain.
+const GONE: u32 = u32::MAX;
+
+/// Chunks of an array over a range.
+macro_rules! chunks_mut {
+    ($array:expr, $range:expr) => {
+        $array[$range].par_chunks_mut(CHUNK)
+    };
+}
+
+impl Cpu {
+    fn drift(&mut self, model: &Model, advance: Advance) {
+        let State { particles: p, bodies: b } = &mut self.state;
+        let fluid = p.segment(Kind::Fluid);
+        let carry = &p.carry;
+        chunks_mut!(p.record, fluid.clone()).zip(p.push[fluid].par_chunks(CHUNK)).enumerate().for_each(
+            |(c, (records, push))| {
+                let carry = carry.get(c * CHUNK..).unwrap_or(&[]);
+                particles::drift(model.solver.integrator, advance, &model.grid, records, push, carry);
+            },
+        );
+        if advance.drag == 0.0 {
+            b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::drift(body, model, advance.dt));
+            bodies::follow(b, model);
+        }
+    }
+
+    /// Sorts every kind. Fluids change places for good; particles of bodies are copied from their slots.
+    fn sort(&mut self, grid: &Grid) {
+        let State { particles: p, bodies: b } = &mut self.state;
+        let from = &mut self.spare;
+        let fluid = p.segment(Kind::Fluid);
+        let cells = &mut self.cells[Kind::Fluid as usize];
+        let living = cells.sort(grid, &p.record[fluid.clone()], Some(&p.id[fluid.clone()]));
+        self.ledger.left += cells.left as u64;
+        self.ledger.lost += cells.lost as u64;
+        self.ledger.nonfinite += cells.nonfinite as u64;
+        std::mem::swap(&mut p.record, &mut from.record);
+        std::mem::swap(&mut p.id, &mut from.id);
+        std::mem::swap(&mut p.owner, &mut from.owner);
+        let n = fluid.len();
+        chunks_mut!(p.record, ..n)
+            .zip(chunks_mut!(p.push_before, ..n))
+            .zip(chunks_mut!(p.id, ..n))
+            .zip(chunks_mut!(p.owner, ..n))
+            .zip(cells.order[..n].par_chunks(CHUNK))
+            .for_each(|((((record, push), id), owner), order)| {
+                for (k, place) in order.iter().enumerate() {
+                    let place = place.load(Relaxed) as usize;
+                    record[k] = from.record[place];
+                    push[k] = p.push[place];
+                    id[k] = from.id[place];
+                    owner[k] = from.owner[place];
+                }
+            });
+        p.count[Kind::Fluid as usize] = living;
+
+        self.copy_bodies(grid, Kind::Rigid);
+        // static particles stay where they are: once into each half of the double buffer
+        if self.static_copies < 2 {
+            self.copy_bodies(grid, Kind::Static);
+            self.static_copies += 1;
+        }
+    }
+
+    /// Sorts the slots of a kind of body and copies them to their places.
+    fn copy_bodies(&mut self, grid: &Grid, kind: Kind) {
+        let State { particles: p, bodies: b } = &mut self.state;
+        let slots = match kind {
+            Kind::Rigid => 0..b.rigid_slots,
+            _ => b.rigid_slots..b.record.len(),
+        };
+        let cells = &mut self.cells[kind as usize];
+        let inside = cells.sort(grid, &b.record[slots.clone()], None);
+        let range = p.segment(kind);
+        let range = range.start..range.start + slots.len();
+        p.count[kind as usize] = inside;
+        let (order, place, base) = (&cells.order, &self.place, range.start);
+        chunks_mut!(p.record, range.clone())
+            .zip(chunks_mut!(p.id, range.clone()))
+            .zip(chunks_mut!(p.owner, range))
+            .zip(order[..slots.len()].par_chunks(CHUNK))
+            .enumerate()
+            .for_each(|(c, (((record, id), owner), order))| {
+                for (k, from) in order.iter().enumerate() {
+                    let slot = slots.start + from.load(Relaxed) as usize;
+                    record[k] = b.record[slot];
+                    id[k] = slot as u32;
+                    owner[k] = b.owner[slot];
+                    let at = c * CHUNK + k;
+                    place[slot].store(if at < inside { (base + at) as u32 } else { GONE }, Relaxed);
+                }
+            });
+    }
+
+    fn density(&mut self, model: &Model) {
+        let p = &mut self.state.particles;
+        let around = Around {
+            grid: &model.grid,
+            records: &p.record,
+            owner: &p.owner,
+            cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
+            first: p.first,
+            support: model.support as f32,
+        };
+        let (count, first) = (p.count, p.first);
+        let level = self.level;
+        for kind in Kind::ALL {
+            let (n, first) = (count[kind as usize], first[kind as usize]);
+            let chunks = &mut self.neighbours[kind as usize];
+            chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
+            let members = |c: usize| first + c * CHUNK..first + ((c + 1) * CHUNK).min(n);
+            if kind == Kind::Fluid {
+                chunks.par_iter_mut().zip(chunks_mut!(p.density, ..n)).enumerate().for_each(
+                    |(c, (chunk, density))| {
+                        dispatch!(level, simd => {
+                            density::fluid_chunk(simd, model, around, members(c), chunk, density);
+                        });
+                    },
+                );
+            } else {
+                chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
+                    dispatch!(level, simd => density::body_chunk(simd, around, kind, members(c), chunk));
+                });
+            }
+        }
+    }
+
+    fn pressure(&mut self, model: &Model) {
+        let p = &mut self.state.particles;
+        let fluid = p.segment(Kind::Fluid);
+        chunks_mut!(p.record, fluid.clone())
+            .zip(p.density[fluid.clone()].par_chunks(CHUNK))
+            .zip(p.owner[fluid].par_chunks(CHUNK))
+            .for_each(|((records, density), owner)| pressure::chunk(model, records, density, owner));
+    }
+
+    fn boundary(&mut self, model: &Model) {
+        let p = &mut self.state.particles;
+        let level = self.level;
+        for kind in [Kind::Rigid, Kind::Static] {
+            let segment = p.segment(kind);
+            let (records, owner, first) = (&p.record, &p.owner, segment.start);
+            chunks_mut!(self.share, segment.clone()).zip(&self.neighbours[kind as usize]).enumerate().for_each(
+                |(c, (share, chunk))| {
+                    dispatch!(level, simd => {
+                        boundary::chunk(simd, model, records, owner, first + c * CHUNK, chunk, share);
+                    });
+                },
+            );
+            for (record, share) in p.record[segment.clone()].iter_mut().zip(&self.share[segment]) {
+                record.share = *share;
+            }
+        }
+    }
+
+    fn forces(&mut self, model: &Model) {
+        let p = &mut self.state.particles;
+        let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
+        for kind in Kind::ALL {
+            let first = p.first[kind as usize];
+            let segment = first..first + p.count[kind as usize];
+            let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
+            let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut [[f32; 3]]| {
+                let input = forces::Input { model, records, owner, first: first + c * CHUNK, particle_mass };
+                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry));
+            };
+            if kind == Kind::Fluid && !p.carry.is_empty() {
+                let carry = p.carry.par_chunks_mut(CHUNK);
+                chunks.zip(carry).for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry));
+            } else {
+                chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut []));
+            }
+        }
+    }
+
+    fn bodies(&mut self, model: &Model) {
+        let State { particles: p, bodies: b } = &mut self.state;
+        let (place, push) = (&self.place, &p.push);
+        let force = |slot: usize| match place[slot].load(Relaxed) {
+            GONE => [0.0; 3],
+            at => push[at as usize],
+        };
+        bodies::sum(b, &mut self.parts, force, model);
+    }
+
+    fn kick(&mut self, model: &Model, advance: Advance) {
+        let State { particles: p, bodies: b } = &mut self.state;
+        let integrator = model.solver.integrator;
+        let fluid = p.segment(Kind::Fluid);
+        chunks_mut!(p.record, fluid.clone())
+            .zip(p.push[fluid.clone()].par_chunks(CHUNK))
+            .zip(p.push_before[fluid].par_chunks(CHUNK))
+            .for_each(|((records, push), before)| {
+                particles::kick(integrator, advance, records, push, before);
+            });
+        if advance.drag == 0.0 {
+            b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::kick(body, integrator, advance.dt));
+        }
+    }
+
+    fn tally(&mut self, model: &Model) {
+        let State { particles: p, bodies: b } = &self.state;
+        let fluid = p.segment(Kind::Fluid);
+        let n = fluid.len();
+        self.sums.resize_with(n.div_ceil(CHUNK), Ledger::default);
+        let neighbours = &self.neighbours[0];
+        self.sums.par_iter_mut().enumerate().for_each(|(c, sum)| {
+            let range = c * CHUNK..((c + 1) * CHUNK).min(n);
+            *sum = Ledger::default();
+            let part = Part {
+                records: &p.record[range.clone()],
+                push: &p.push[range.clone()],
+                density: &p.density[range.clone()],
+                owner: &p.owner[range],
+                neighbours: &neighbours[c],
+            };
+            part.tally(model, sum);
+        });
+        let mut total = Ledger {
+            left: self.ledger.left,
+            lost: self.ledger.lost,
+            nonfinite: self.ledger.nonfinite,
+            fluid: n,
+            rigid_lost: self.cells[Kind::Rigid as usize].lost,
+            ..Ledger::default()
+        };
+        let mut full = 0.0;
+        for s in &self.sums {
+            total.speed = total.speed.max(s.speed);
+            total.acceleration = total.acceleration.max(s.acceleration);
+            total.momentum += s.momentum;
+            total.momentum_scale += s.momentum_scale;
+            total.external_force += s.external_force;
+            total.total_force += s.total_force;
+            total.force_scale += s.force_scale;
+            total.kinetic += s.kinetic;
+            total.potential += s.potential;
+            total.density_error_mean += s.density_error_mean;
+            total.density_error_max = total.density_error_max.max(s.density_error_max);
+            total.neighbours += s.neighbours;
+            full += s.fluid as f64;
+        }
+        total.density_error_mean /= f64::max(full, 1.0);
+        total.neighbours /= f64::max(n as f64, 1.0);
+        for body in &b.body {
+            if body.is_static() {
+                total.external_force -= body.force;
+                continue;
+            }
+            total.momentum += body.mass * body.v;
+            total.momentum_scale += body.mass * body.v.length();
+            total.external_force += body.mass * model.gravity;
+            total.total_force += body.force;
+            total.kinetic += 0.5 * (body.mass * body.v.length_squared() + body.l.dot(body.omega));
+            total.potential -= body.mass * model.gravity.dot(body.x - model.grid.min);
+            total.force_scale += body.force.length();
+            if !(body.x.is_finite() && body.v.is_finite() && body.l.is_finite()) {
+                total.nonfinite += 1;
+            }
+        }
+        for (slot, record) in b.record[..b.rigid_slots].iter().enumerate() {
+            total.speed = total.speed.max(f64::from(glam::Vec3::from(record.v).length()));
+            if !model.fields.is_empty() {
+                let mass = f64::from(self.particle_mass[b.owner[slot] as usize]);
+                total.external_force += mass * forces::fields(model, record).as_dvec3();
+            }
+        }
+        self.ledger = total;
+    }
+}
+
+/// What the ledger reads of one chunk.
+struct Part<'a> {
+    records: &'a [Record],
+    push: &'a [[f32; 3]],
+    density: &'a [f32],
+    owner: &'a [u32],
+    neighbours: &'a NeighbourChunk,
+}
+
+impl Part<'_> {
+    /// Sums; `fluid` counts the particles with full support.
+    fn tally(&self, model: &Model, sum: &mut Ledger) {
+        let mut density_error = 0.0;
+        for (k, r) in self.records.iter().enumerate() {
+            let mass = f64::from(model.fluids[self.owner[k] as usize].mass);
+            let v = DVec3::from(r.v.map(f64::from));
+            let a = DVec3::from(self.push[k].map(f64::from));
+            let speed = v.length();
+            sum.speed = sum.speed.max(speed);
+            sum.acceleration = sum.acceleration.max(a.length());
+            sum.momentum += mass * v;
+            sum.momentum_scale += mass * speed;
+            sum.total_force += mass * a;
+            sum.force_scale += mass * a.length();
+            let mut outside = model.gravity;
+            if !model.fields.is_empty() {
+                outside += forces::fields(model, r).as_dvec3();
+            }
+            sum.external_force += mass * outside;
+            sum.kinetic += 0.5 * mass * speed * speed;
+            let x = DVec3::from(r.x.map(f64::from));
+            sum.potential -= mass * model.gravity.dot(x - model.grid.min);
+            let runs = &self.neighbours.runs[k];
+            let fluid = runs.count(Kind::Fluid) as f64 - 1.0;
+            sum.neighbours += fluid;
+            let all: usize = Kind::ALL.iter().map(|&kind| runs.count(kind)).sum();
+            if all as f64 >= 0.8 * model.full_support {
+                let error = f64::from((self.density[k] - 1.0).abs());
+                density_error += error;
+                sum.density_error_max = sum.density_error_max.max(error);
+                sum.fluid += 1;
+            }
+        }
+        sum.density_error_mean = density_error;
+    }
+}

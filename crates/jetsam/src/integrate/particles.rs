@@ -1,0 +1,50 @@
+//! Free particles: drift and kick of a chunk of fluid (E20).
+
+use super::Advance;
+use crate::interact::cells::Grid;
+use crate::scene::Integrator;
+use crate::state::Record;
+
+/// Drift: `x += v dt + a dt^2 / 2` (+ XSPH), and the velocity predicted, `v + a dt`.
+pub fn drift(
+    integrator: Integrator,
+    advance: Advance,
+    grid: &Grid,
+    records: &mut [Record],
+    push: &[[f32; 3]],
+    carry: &[[f32; 3]],
+) {
+    let dt = advance.dt as f32;
+    let half = match integrator {
+        Integrator::Leapfrog => 0.5 * dt,
+        Integrator::Euler => dt, // the whole kick first
+    };
+    for (k, (r, a)) in records.iter_mut().zip(push).enumerate() {
+        for c in 0..3 {
+            let carried = carry.get(k).map_or(0.0, |v| v[c]);
+            r.x[c] += dt * (r.v[c] + half * a[c] + carried);
+            r.v[c] += dt * a[c];
+        }
+        grid.wrap(&mut r.x);
+    }
+}
+
+/// Kick: the prediction corrected by half the change of acceleration.
+pub fn kick(
+    integrator: Integrator,
+    advance: Advance,
+    records: &mut [Record],
+    push: &[[f32; 3]],
+    before: &[[f32; 3]],
+) {
+    let half = 0.5 * advance.dt as f32;
+    let keep = (-advance.drag * advance.dt).exp() as f32;
+    for ((r, a), b) in records.iter_mut().zip(push).zip(before) {
+        for c in 0..3 {
+            if integrator == Integrator::Leapfrog {
+                r.v[c] += half * (a[c] - b[c]);
+            }
+            r.v[c] *= keep;
+        }
+    }
+}

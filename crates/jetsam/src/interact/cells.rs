@@ -1,0 +1,239 @@
+//! Stage `cells`: sorts the particles of a kind into cells as wide as the support.
+//!
+//! In: records in any order. Out: a permutation sorted by cell (x fastest), ties by id, and where each cell
+//! begins. A stable counting sort in parallel; its result does not depend on the number of threads. Particles
+//! outside the domain or not finite come last and are counted out.
+
+use super::CHUNK;
+use crate::scene::Wall;
+use crate::state::Record;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// The box particles live in, cut into cells at least as wide as the support.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// Lower corner of the domain (m).
+    pub min: DVec3,
+    /// Upper corner of the domain (m).
+    pub max: DVec3,
+    /// What is at the sides of each axis.
+    pub walls: [Wall; 3],
+    /// Lower corner of the first cell (m).
+    pub origin: [f32; 3],
+    /// Cells per metre on each axis.
+    pub inverse: [f32; 3],
+    /// Number of cells on each axis.
+    pub cells: [i32; 3],
+    /// Length of each periodic axis (m), 0 for the others.
+    pub period: [f32; 3],
+    /// Where particles may be (m): the domain, and inside solid walls as deep as their particles go.
+    pub lower: [f32; 3],
+    /// The upper end of where particles may be (m).
+    pub upper: [f32; 3],
+}
+
+/// Why a particle is no longer part of the simulation.
+const LEFT: u32 = 1;
+const LOST: u32 = 2;
+const NONFINITE: u32 = 3;
+
+impl Grid {
+    /// Cells for a domain. `wall` is how deep solid walls reach outside the domain (m).
+    pub fn new(min: DVec3, max: DVec3, walls: [Wall; 3], dimensions: u32, support: f64, wall: f64) -> Self {
+        let mut grid = Self {
+            min,
+            max,
+            walls,
+            origin: [0.0; 3],
+            inverse: [0.0; 3],
+            cells: [1; 3],
+            period: [0.0; 3],
+            lower: [f32::NEG_INFINITY; 3],
+            upper: [f32::INFINITY; 3],
+        };
+        for a in 0..3 {
+            if dimensions == 2 && a == 1 {
+                grid.walls[a] = Wall::Open;
+                continue;
+            }
+            let pad = if walls[a] == Wall::Solid { wall } else { 0.0 };
+            let (low, high) = (min[a] - pad, max[a] + pad);
+            let count = match walls[a] {
+                Wall::Periodic => ((high - low) / support).floor().max(1.0),
+                _ => ((high - low) / support).ceil().max(1.0),
+            };
+            let width = if walls[a] == Wall::Periodic { (high - low) / count } else { support };
+            grid.origin[a] = low as f32;
+            grid.inverse[a] = (1.0 / width) as f32;
+            grid.cells[a] = count as i32;
+            grid.lower[a] = low as f32;
+            grid.upper[a] = high as f32;
+            if walls[a] == Wall::Periodic {
+                grid.period[a] = (high - low) as f32;
+            }
+        }
+        grid
+    }
+
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        self.cells.iter().map(|&c| c as usize).product()
+    }
+
+    /// Whether there is no cell (never).
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether any axis is periodic.
+    pub fn is_periodic(&self) -> bool {
+        self.period.iter().any(|&p| p > 0.0)
+    }
+
+    /// Cell coordinates of a place, clamped to the grid.
+    #[inline]
+    pub fn coordinates(&self, x: [f32; 3]) -> [i32; 3] {
+        std::array::from_fn(|a| {
+            let c = ((x[a] - self.origin[a]) * self.inverse[a]) as i32; // saturates; NaN becomes 0
+            c.clamp(0, self.cells[a] - 1)
+        })
+    }
+
+    /// Index of a cell.
+    #[inline]
+    pub fn index(&self, c: [i32; 3]) -> usize {
+        ((c[2] * self.cells[1] + c[1]) * self.cells[0] + c[0]) as usize
+    }
+
+    /// Brings a position on periodic axes back into the domain.
+    #[inline]
+    pub fn wrap(&self, x: &mut [f32; 3]) {
+        for a in 0..3 {
+            let period = self.period[a];
+            if period > 0.0 {
+                if x[a] >= self.upper[a] {
+                    x[a] -= period;
+                }
+                if x[a] < self.lower[a] {
+                    x[a] += period;
+                    // a tiny negative offset rounds up to the far side, which is the near side
+                    if x[a] >= self.upper[a] {
+                        x[a] = self.lower[a];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Cell of a particle, or the cell past the last with the reason in it when it has left.
+    #[inline]
+    fn key(&self, x: [f32; 3]) -> u32 {
+        let gone = if !x.iter().all(|c| c.is_finite()) {
+            NONFINITE
+        } else {
+            let mut gone = 0;
+            for a in 0..3 {
+                if x[a] < self.lower[a] || x[a] > self.upper[a] {
+                    gone = gone.max(if self.walls[a] == Wall::Open { LEFT } else { LOST });
+                }
+            }
+            gone
+        };
+        if gone == 0 { self.index(self.coordinates(x)) as u32 } else { self.len() as u32 + gone - 1 }
+    }
+}
+
+/// Where each cell of a kind begins, and the scratch of its sort.
+#[derive(Debug, Default)]
+pub struct Cells {
+    /// `start[c]..start[c + 1]` are the places of cell `c` in the sorted order.
+    pub start: Vec<u32>,
+    /// For each place in the sorted order, where its particle stands in the input.
+    pub order: Vec<AtomicU32>,
+    /// Particles that passed an open side, at this sort.
+    pub left: usize,
+    /// Particles that passed a solid wall, at this sort.
+    pub lost: usize,
+    /// Particles whose position was not finite, at this sort.
+    pub nonfinite: usize,
+    keys: Vec<u32>,
+    counts: Vec<Vec<u32>>,
+}
+
+impl Cells {
+    /// Sorts `records`; ties are put in the order of `id`, or stay in input order without. Returns how many
+    /// particles are still inside.
+    pub fn sort(&mut self, grid: &Grid, records: &[Record], id: Option<&[u32]>) -> usize {
+        let n = records.len();
+        let bins = grid.len() + NONFINITE as usize;
+        self.start.resize(bins + 1, 0);
+        self.keys.resize(n, 0);
+        if self.order.len() < n {
+            self.order.resize_with(n, AtomicU32::default);
+        }
+        // the sort is stable, so the number of parts changes the speed alone
+        let parts = rayon::current_num_threads().clamp(1, n.div_ceil(CHUNK).max(1));
+        let part = n.div_ceil(parts).max(1);
+        self.counts.resize_with(parts, Vec::new);
+        self.counts.par_iter_mut().zip(self.keys.par_chunks_mut(part)).zip(records.par_chunks(part)).for_each(
+            |((count, keys), records)| {
+                count.clear();
+                count.resize(bins, 0);
+                for (key, record) in keys.iter_mut().zip(records) {
+                    *key = grid.key(record.x);
+                    count[*key as usize] += 1;
+                }
+            },
+        );
+        for count in self.counts.iter_mut().skip(n.div_ceil(part)) {
+            count.clear();
+            count.resize(bins, 0);
+        }
+        let mut sum = 0;
+        for bin in 0..bins {
+            self.start[bin] = sum;
+            for count in &mut self.counts {
+                sum += std::mem::replace(&mut count[bin], sum);
+            }
+        }
+        self.start[bins] = sum;
+        let order = &self.order;
+        self.counts.par_iter_mut().zip(self.keys.par_chunks(part)).enumerate().for_each(|(p, (next, keys))| {
+            for (i, &key) in keys.iter().enumerate() {
+                let place = &mut next[key as usize];
+                order[*place as usize].store((p * part + i) as u32, Relaxed);
+                *place += 1;
+            }
+        });
+        if let Some(id) = id {
+            self.start.par_windows(2).with_min_len(CHUNK).for_each(|cell| {
+                by_id(&order[cell[0] as usize..cell[1] as usize], id);
+            });
+        }
+        let cells = grid.len();
+        self.left = (self.start[cells + 1] - self.start[cells]) as usize;
+        self.lost = (self.start[cells + 2] - self.start[cells + 1]) as usize;
+        self.nonfinite = (self.start[cells + 3] - self.start[cells + 2]) as usize;
+        n - self.left - self.lost - self.nonfinite
+    }
+}
+
+/// Insertion sort of one cell: few members, nearly in order.
+fn by_id(cell: &[AtomicU32], id: &[u32]) {
+    for i in 1..cell.len() {
+        let moving = cell[i].load(Relaxed);
+        let key = id[moving as usize];
+        let mut j = i;
+        while j > 0 {
+            let before = cell[j - 1].load(Relaxed);
+            if id[before as usize] <= key {
+                break;
+            }
+            cell[j].store(before, Relaxed);
+            j -= 1;
+        }
+        cell[j].store(moving, Relaxed);
+    }
+}

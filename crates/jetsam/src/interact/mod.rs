@@ -1,0 +1,15 @@
+//! Chapter 2, interaction: cells, neighbours and density, pressure, boundary pressure, forces.
+//!
+//! Each file is one stage; [`crate::backend::Cpu`] calls them in the order of [`crate::stage`].
+
+pub mod boundary;
+pub mod cells;
+pub mod density;
+pub mod forces;
+pub mod lanes;
+pub mod neighbours;
+pub mod pressure;
+
+/// Particles handled as one parallel task. Fixed: sums over tasks are added in task order, so that no result
+/// depends on the number of threads.
+pub const CHUNK: usize = 512;

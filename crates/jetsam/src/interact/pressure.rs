@@ -1,0 +1,33 @@
+//! Stage `pressure`: equation of state (E3).
+//!
+//! In: `density`. Out: the records' pressure share and, for Mueller's form of E4, their present volume.
+
+use crate::laws::fluid;
+use crate::model::Model;
+use crate::scene::{EquationOfState, PressureForce};
+use crate::state::Record;
+
+/// Pressure (Pa) at relative density `d` of fluid `owner`.
+#[inline]
+pub fn pressure(model: &Model, owner: u32, d: f32) -> f32 {
+    let stiffness = model.fluids[owner as usize].stiffness;
+    let p = match model.solver.equation_of_state {
+        EquationOfState::Linear => fluid::pressure_linear(d, stiffness),
+        EquationOfState::Tait => fluid::pressure_tait(d, stiffness),
+    };
+    if model.solver.negative_pressure { p } else { p.max(0.0) }
+}
+
+/// Pressure shares of a chunk of fluid particles.
+pub fn chunk(model: &Model, records: &mut [Record], density: &[f32], owner: &[u32]) {
+    for ((r, &d), &owner) in records.iter_mut().zip(density).zip(owner) {
+        let p = pressure(model, owner, d);
+        match model.solver.pressure_force {
+            PressureForce::Symmetric => r.share = fluid::pressure_share(p, d),
+            PressureForce::Mueller => {
+                r.share = 0.5 * p;
+                r.volume = model.volume as f32 / d;
+            }
+        }
+    }
+}

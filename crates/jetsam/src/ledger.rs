@@ -1,0 +1,42 @@
+//! What a step leaves behind in numbers: extremes that bound the next step, what was lost, momentum, energies.
+
+use glam::DVec3;
+
+/// Sums over the particles and bodies of a state, made in a fixed order.
+#[derive(Clone, Debug, Default)]
+pub struct Ledger {
+    /// Largest speed of any particle (m/s).
+    pub speed: f64,
+    /// Largest acceleration of any fluid particle (m/s^2).
+    pub acceleration: f64,
+    /// Momentum of fluids and rigid bodies (kg m/s).
+    pub momentum: DVec3,
+    /// Sum of the magnitudes of the momenta of particles and bodies (kg m/s).
+    pub momentum_scale: f64,
+    /// Force from outside: walls, static bodies, gravity, fields (N).
+    pub external_force: DVec3,
+    /// Sum of all forces on fluids and rigid bodies (N): equals `external_force` up to rounding (E12, C9).
+    pub total_force: DVec3,
+    /// Sum of the magnitudes of the forces on fluids' and bodies' particles (N).
+    pub force_scale: f64,
+    /// Kinetic energy (J).
+    pub kinetic: f64,
+    /// Potential energy in the gravity vector, zero at the domain's lower corner (J).
+    pub potential: f64,
+    /// Mean of `|D - 1|` over fluid particles with full support.
+    pub density_error_mean: f64,
+    /// Largest `|D - 1|` over fluid particles with full support.
+    pub density_error_max: f64,
+    /// Mean number of neighbours of a fluid particle, itself not counted.
+    pub neighbours: f64,
+    /// Fluid particles alive.
+    pub fluid: usize,
+    /// Fluid particles that passed an open side, since the beginning.
+    pub left: u64,
+    /// Fluid particles that got through a solid wall, since the beginning.
+    pub lost: u64,
+    /// Particles of rigid bodies that are now beyond a solid wall.
+    pub rigid_lost: usize,
+    /// Particles found with a position that is not finite, since the beginning.
+    pub nonfinite: u64,
+}

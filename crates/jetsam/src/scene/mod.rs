@@ -1,0 +1,496 @@
+//! What the user writes: the scene file (TOML), nothing derived.
+//!
+//! A [`Scene`] is plain data; [`load`](Scene::load) reads it with every mistake reported by file, line and
+//! remedy. Numbers have their unit, default and range in [`crate::params`]. Lengths are in metres, z points up.
+
+pub mod builtin;
+mod load;
+pub mod solid;
+
+pub use load::{Source, schema};
+
+use crate::laws::kernel::KernelSet;
+use crate::params::default as d;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A whole scene.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// One line that says what is seen.
+    #[serde(default)]
+    pub title: String,
+    /// The space and what pulls in it.
+    #[serde(default)]
+    pub world: World,
+    /// The box in which particles live.
+    pub domain: Domain,
+    /// How fine the scene is.
+    pub resolution: Resolution,
+    /// Laws and numbers of the solver.
+    #[serde(default)]
+    pub solver: Solver,
+    /// Length of a run and its frames.
+    #[serde(default)]
+    pub run: Run,
+    /// Where pictures are taken from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Camera>,
+    /// Fluids.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fluid: Vec<Fluid>,
+    /// Rigid bodies.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rigid: Vec<Rigid>,
+    /// Bodies that do not move: obstacles, terrain.
+    #[serde(default, rename = "static", skip_serializing_if = "Vec::is_empty")]
+    pub statics: Vec<Static>,
+    /// Fields that pull on everything.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub force: Vec<Force>,
+    /// The text this scene was read from, for error messages.
+    #[serde(skip)]
+    pub source: Source,
+}
+
+/// The space and what pulls in it.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct World {
+    /// 3, or 2 for a scene in the x-z plane (y is ignored; masses are per metre of depth).
+    pub dimensions: u32,
+    /// Acceleration of gravity.
+    pub gravity: [f64; 3],
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self { dimensions: 3, gravity: [0.0, 0.0, -9.81], seed: 0 }
+    }
+}
+
+/// The box in which particles live.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Domain {
+    /// Lower corner (m).
+    pub min: [f64; 3],
+    /// Upper corner (m).
+    pub max: [f64; 3],
+    /// What is at the sides, one word per axis: x, y, z.
+    #[serde(default)]
+    pub walls: [Wall; 3],
+}
+
+/// What is at the two sides of the domain on one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Wall {
+    /// Solid walls.
+    #[default]
+    Solid,
+    /// The two sides are one: what leaves here enters there.
+    Periodic,
+    /// Nothing: what passes the side has left the scene.
+    Open,
+}
+
+/// How fine the scene is.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Resolution {
+    /// Distance of neighbouring particles, `dx`: the one number from which masses, support, stiffness and time step derive.
+    pub spacing: f64,
+}
+
+/// Laws and numbers of the solver.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Solver {
+    /// How pressure is found.
+    #[serde(default)]
+    pub pressure: Pressure,
+    /// Equation of state (E3).
+    #[serde(default)]
+    pub equation_of_state: EquationOfState,
+    /// Whether pressure may be negative (E3). With a density that is summed, a free surface then pulls itself in.
+    #[serde(default)]
+    pub negative_pressure: bool,
+    /// Form of the pressure force (E4).
+    #[serde(default)]
+    pub pressure_force: PressureForce,
+    /// Smoothing kernel (E2).
+    #[serde(default)]
+    pub kernel: KernelSet,
+    /// Radius of the kernel's support; about 30 neighbours at 2, 57 at 2.4.
+    #[serde(default = "d::support")]
+    pub support: f64,
+    /// Speed of sound `c_0` (E3). When absent, ten times the largest speed the scene can reach.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sound_speed: Option<f64>,
+    /// Law of the fluids' own viscosity (E5).
+    #[serde(default)]
+    pub viscosity: Viscosity,
+    /// Monaghan's alpha (E5): damps approaching pairs, keeps the fluid orderly. 0 turns it off.
+    #[serde(default = "d::artificial_viscosity")]
+    pub artificial_viscosity: f64,
+    /// XSPH (E6): how much particles are carried with their neighbours. 0 turns it off.
+    #[serde(default = "d::xsph")]
+    pub xsph: f64,
+    /// What acts between fluid and rigid bodies.
+    #[serde(default)]
+    pub coupling: Coupling,
+    /// Dashpot of contacts (E11).
+    #[serde(default)]
+    pub damping: Damping,
+    /// Contact diameter `r` of two particles of different bodies (E10).
+    #[serde(default = "d::contact_diameter")]
+    pub contact_diameter: f64,
+    /// Largest overlap of bodies that meet at the scene's largest speed (E14): sets contact stiffness where none is stated.
+    #[serde(default = "d::contact_overlap")]
+    pub contact_overlap: f64,
+    /// Time integration (E20).
+    #[serde(default)]
+    pub integrator: Integrator,
+    /// Largest time step. When absent, from E29.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dt: Option<f64>,
+    /// `C_a` of E29: fraction of the time sound takes through half a support.
+    #[serde(default = "d::courant")]
+    pub courant: f64,
+    /// `C_f` of E29: bound by the largest acceleration.
+    #[serde(default = "d::courant_force")]
+    pub courant_force: f64,
+    /// `C_v` of E29: bound by viscosity.
+    #[serde(default = "d::courant_viscous")]
+    pub courant_viscous: f64,
+    /// Before time begins, let the fluid come to rest under strong drag for this long (bodies stand still).
+    #[serde(default = "d::settle")]
+    pub settle: f64,
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        toml::from_str("").expect("every key of [solver] has a default")
+    }
+}
+
+/// How pressure is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Pressure {
+    /// Weakly compressible SPH: pressure from density by an equation of state.
+    #[default]
+    Wcsph,
+}
+
+/// E3.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum EquationOfState {
+    /// `p = c_0^2 (rho - rho_0)`.
+    Linear,
+    /// `p = B ((rho / rho_0)^7 - 1)`.
+    #[default]
+    Tait,
+}
+
+/// E4.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum PressureForce {
+    /// `p_i / rho_i^2 + p_j / rho_j^2`.
+    #[default]
+    Symmetric,
+    /// `(p_i + p_j) / (2 rho_j)` (Mueller et al. 2003; the seed authors).
+    Mueller,
+}
+
+/// E5.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Viscosity {
+    /// Morris et al. 1997.
+    #[default]
+    Laminar,
+    /// Mueller et al. 2003.
+    Mueller,
+}
+
+/// What acts between fluid and rigid bodies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Coupling {
+    /// E17: the bodies' particles take part in density and pressure.
+    #[default]
+    Pressure,
+    /// E16, the article's: spring and dashpot between a fluid and a rigid particle.
+    Spring,
+}
+
+/// E11.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Damping {
+    /// Only the relative velocity along the line of centres.
+    #[default]
+    Normal,
+    /// The full relative velocity, as in the article.
+    Full,
+}
+
+/// E20.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Integrator {
+    /// Kick-drift-kick, second order.
+    #[default]
+    Leapfrog,
+    /// Semi-implicit Euler, first order.
+    Euler,
+}
+
+/// Length of a run and its frames.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// How long to simulate unless the command says otherwise.
+    #[serde(default = "d::seconds")]
+    pub seconds: f64,
+    /// Frames per simulated second.
+    #[serde(default = "d::frames_per_second")]
+    pub frames_per_second: f64,
+    /// Particles that may be lost before the run counts as gone wrong.
+    #[serde(default = "d::lost_allowed")]
+    pub lost_allowed: f64,
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        toml::from_str("").expect("every key of [run] has a default")
+    }
+}
+
+/// Where pictures are taken from.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Position of the eye (m).
+    pub eye: [f64; 3],
+    /// Point looked at (m).
+    pub target: [f64; 3],
+    /// Vertical angle of view.
+    #[serde(default = "d::fov")]
+    pub fov: f64,
+}
+
+/// A body of fluid.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fluid {
+    /// Name; `fluid` when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Where it stands at the beginning.
+    pub shape: Shape,
+    /// Rest density `rho_0`.
+    #[serde(default = "d::fluid_density")]
+    pub density: f64,
+    /// Dynamic viscosity `mu`.
+    #[serde(default = "d::fluid_viscosity")]
+    pub viscosity: f64,
+    /// Velocity at the beginning.
+    #[serde(default)]
+    pub velocity: [f64; 3],
+    /// How the particles stand at the beginning.
+    #[serde(default)]
+    pub start: Start,
+}
+
+/// How a fluid's particles stand at the beginning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Start {
+    /// On a lattice, squeezed along gravity as far as the weight of the fluid above asks for: no first shock.
+    #[default]
+    Hydrostatic,
+    /// On an even lattice, without pressure.
+    Lattice,
+}
+
+/// A rigid body, or several copies of it.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rigid {
+    /// Name; `rigid` when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Its shape in its own frame.
+    pub shape: Shape,
+    /// Density; either this or `mass`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density: Option<f64>,
+    /// Mass (per metre of depth in 2D); either this or `density`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    /// Where the origin of the shape's frame is put (m).
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Rotation about that origin: axis x, y, z and an angle in degrees.
+    #[serde(default = "no_rotation")]
+    pub rotation: [f64; 4],
+    /// Velocity of the centre of mass.
+    #[serde(default)]
+    pub velocity: [f64; 3],
+    /// Angular velocity, world axes.
+    #[serde(default)]
+    pub spin: [f64; 3],
+    /// Restitution `e` of contacts (E14); of two bodies the geometric mean counts.
+    #[serde(default = "d::rigid_restitution")]
+    pub restitution: f64,
+    /// Spring constant of one contact of two particles; wins over `contact_overlap` (E14).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<f64>,
+    /// Dashpot of one contact of two particles; wins over `restitution` (E14).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damping: Option<f64>,
+    /// Copies in place of one body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copies: Option<Copies>,
+}
+
+fn no_rotation() -> [f64; 4] {
+    [0.0, 0.0, 1.0, 0.0]
+}
+
+/// Copies of a rigid body.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Copies {
+    /// How many.
+    pub count: u32,
+    /// On a grid about `position`; either this or `random`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grid: Option<Grid>,
+    /// At random in a box (m, absolute), no two touching; either this or `grid`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub random: Option<Region>,
+    /// Whether each copy gets a random orientation.
+    #[serde(default)]
+    pub tumble: bool,
+}
+
+/// A grid of places, x running fastest, then y, then z.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Number of places along x and y; z goes on as far as the count asks for.
+    pub columns: [u32; 2],
+    /// Distance of neighbouring places (m).
+    pub step: [f64; 3],
+}
+
+/// A box.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// Lower corner (m).
+    pub min: [f64; 3],
+    /// Upper corner (m).
+    pub max: [f64; 3],
+}
+
+/// A body that does not move.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Static {
+    /// Name; `static` when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Its shape in its own frame.
+    pub shape: Shape,
+    /// Where the origin of the shape's frame is put (m).
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Rotation about that origin: axis x, y, z and an angle in degrees.
+    #[serde(default = "no_rotation")]
+    pub rotation: [f64; 4],
+}
+
+/// A shape. In a 2D scene its section with the x-z plane counts.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+pub enum Shape {
+    /// A box along the axes.
+    Box(Region),
+    /// A ball (in 2D a disc).
+    Sphere {
+        /// Centre (m).
+        center: [f64; 3],
+        /// Radius (m).
+        radius: f64,
+    },
+    /// A cylinder. In 2D its axis must be y.
+    Cylinder {
+        /// Middle of the axis (m).
+        center: [f64; 3],
+        /// Direction of the axis.
+        axis: [f64; 3],
+        /// Radius (m).
+        radius: f64,
+        /// Length of the axis (m).
+        height: f64,
+    },
+    /// A triangle mesh: OBJ, STL, PLY, glTF or GLB. 3D scenes only.
+    Mesh {
+        /// File, relative to the scene file.
+        path: String,
+        /// Factor on its coordinates.
+        #[serde(default = "one")]
+        scale: f64,
+    },
+    /// The particles themselves (m).
+    Points(Vec<[f64; 3]>),
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// A field that pulls on everything (E30).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+pub enum Force {
+    /// A point that attracts.
+    Point {
+        /// Its place (m).
+        center: [f64; 3],
+        /// `G M` (m^3/s^2).
+        strength: f64,
+        /// Radius inside which the pull is softened (m).
+        core: f64,
+    },
+    /// An even wind that drags.
+    Wind {
+        /// Velocity of the wind (m/s).
+        velocity: [f64; 3],
+        /// Rate at which velocities approach the wind's (1/s).
+        rate: f64,
+    },
+    /// A vortex that drags.
+    Vortex {
+        /// A point on its axis (m).
+        center: [f64; 3],
+        /// Direction of its axis.
+        axis: [f64; 3],
+        /// Largest speed (m/s), reached at the radius of the core.
+        speed: f64,
+        /// Radius of the core (m).
+        core: f64,
+        /// Rate at which velocities approach the vortex's (1/s).
+        rate: f64,
+    },
+}

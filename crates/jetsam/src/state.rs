@@ -1,0 +1,156 @@
+//! What changes while a world runs: particles (structure of arrays, one set for every kind) and bodies.
+//!
+//! Particles live in three segments of the same arrays, one per [`Kind`]; inside a segment they are sorted by
+//! cell, ties by id, by the stage `cells`. Each array says which stage writes it.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat3, DQuat, DVec3};
+use std::ops::Range;
+
+/// What a particle belongs to. The kind decides which laws apply (see [`crate::laws`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(usize)]
+pub enum Kind {
+    /// Free particles of a fluid.
+    Fluid = 0,
+    /// Particles of a rigid body.
+    Rigid = 1,
+    /// Particles of walls and static bodies.
+    Static = 2,
+}
+
+impl Kind {
+    /// All kinds, in the order of their segments.
+    pub const ALL: [Kind; 3] = [Kind::Fluid, Kind::Rigid, Kind::Static];
+    /// How many kinds there are.
+    pub const COUNT: usize = 3;
+}
+
+/// What every pair of neighbours reads: 32 bytes, one load on wide machines.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub struct Record {
+    /// Position (m). Written by drift.
+    pub x: [f32; 3],
+    /// Rest volume `V` (m^3; m^2 in 2D). Constant.
+    pub volume: f32,
+    /// Velocity (m/s): predicted to the step's end between drift and kick. Written by drift and kick.
+    pub v: [f32; 3],
+    /// Pressure share `p / D^2` (Pa). Written by pressure (fluid) and boundary (bodies).
+    pub share: f32,
+}
+
+/// All particles. Arrays are indexed alike; `segment` tells which range belongs to a kind.
+#[derive(Clone, Debug, Default)]
+pub struct Particles {
+    /// What pairs read. Permuted by cells.
+    pub record: Vec<Record>,
+    /// Fluid: acceleration (m/s^2). Bodies' particles: force (N). Written by forces.
+    pub push: Vec<[f32; 3]>,
+    /// Acceleration of the step before (m/s^2), fluid only. Kept by cells for the kick.
+    pub push_before: Vec<[f32; 3]>,
+    /// Relative density `D = rho / rho_0`, fluid only. Written by density.
+    pub density: Vec<f32>,
+    /// Velocity added by XSPH (m/s), fluid only; empty when XSPH is off. Written by forces.
+    pub carry: Vec<[f32; 3]>,
+    /// Fluid: identity, counted over all fluids from 0. Bodies: slot in [`Bodies`]. Permuted by cells.
+    pub id: Vec<u32>,
+    /// Index of the fluid or of the body the particle belongs to. Permuted by cells.
+    pub owner: Vec<u32>,
+    /// First index of each kind's segment.
+    pub first: [usize; Kind::COUNT],
+    /// Living particles of each kind's segment. Fluid shrinks when particles leave (cells).
+    pub count: [usize; Kind::COUNT],
+}
+
+impl Particles {
+    /// The living particles of a kind.
+    pub fn segment(&self, kind: Kind) -> Range<usize> {
+        let first = self.first[kind as usize];
+        first..first + self.count[kind as usize]
+    }
+
+    /// Number of living particles of all kinds.
+    pub fn len(&self) -> usize {
+        self.count.iter().sum()
+    }
+
+    /// Whether there is no particle.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// A rigid or static body. Double precision: bodies are few, and a falling body must fall exactly.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Name from the scene; copies carry a number.
+    pub name: String,
+    /// Mass (kg; kg/m in 2D). Infinite for static bodies.
+    pub mass: f64,
+    /// Inverse of the inertia tensor about the centre of mass in the body's own axes (1/(kg m^2)); zero if static.
+    pub inverse_inertia: DMat3,
+    /// Slots of the body's particles.
+    pub slots: Range<usize>,
+    /// Natural logarithm of the restitution (E14).
+    pub ln_restitution: f64,
+    /// Spring constant of one contact if stated (N/m).
+    pub stiffness: Option<f64>,
+    /// Dashpot of one contact if stated (N s/m).
+    pub damping: Option<f64>,
+    /// Centre of mass (m).
+    pub x: DVec3,
+    /// Velocity (m/s).
+    pub v: DVec3,
+    /// Velocity half a step before the present (m/s). Written by drift.
+    pub v_half: DVec3,
+    /// Orientation, body to world.
+    pub q: DQuat,
+    /// Angular momentum about the centre of mass, world axes (kg m^2/s).
+    pub l: DVec3,
+    /// Angular momentum half a step before the present. Written by drift.
+    pub l_half: DVec3,
+    /// Angular velocity (rad/s), `I^-1 L`.
+    pub omega: DVec3,
+    /// Force (N), gravity included. Written by bodies.
+    pub force: DVec3,
+    /// Torque about the centre of mass (N m). Written by bodies.
+    pub torque: DVec3,
+}
+
+impl Body {
+    /// Whether forces cannot move the body.
+    pub fn is_static(&self) -> bool {
+        self.mass.is_infinite()
+    }
+
+    /// `I^-1` in world axes for the orientation `q`.
+    pub fn inverse_inertia_at(&self, q: DQuat) -> DMat3 {
+        let r = DMat3::from_quat(q);
+        r * self.inverse_inertia * r.transpose()
+    }
+}
+
+/// Bodies and, slot by slot, their particles: a body's slots are contiguous.
+#[derive(Clone, Debug, Default)]
+pub struct Bodies {
+    /// Rigid bodies first, static bodies after.
+    pub body: Vec<Body>,
+    /// Place of each slot in its body's frame, relative to the centre of mass (m). Constant.
+    pub offset: Vec<DVec3>,
+    /// Body of each slot. Constant.
+    pub owner: Vec<u32>,
+    /// What the slot's particle shows to pairs. Written by drift; rigid slots only, static ones are constant.
+    pub record: Vec<Record>,
+    /// Number of slots of rigid bodies; those of static bodies follow.
+    pub rigid_slots: usize,
+}
+
+/// The whole changing state of a world.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    /// Particles of every kind.
+    pub particles: Particles,
+    /// Bodies.
+    pub bodies: Bodies,
+}

@@ -1,0 +1,211 @@
+//! A world: constants, state and the step.
+
+use crate::assemble::Assembly;
+use crate::backend::{Backend, Cpu};
+use crate::error::Result;
+use crate::integrate::Advance;
+use crate::ledger::Ledger;
+use crate::mesh::Mesh;
+use crate::model::{DtBound, Model};
+use crate::scene::Scene;
+use crate::stage::Stage;
+use crate::state::State;
+use glam::DVec3;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// A world that runs.
+pub struct World {
+    model: Model,
+    backend: Box<dyn Backend>,
+    meshes: Vec<Option<(Arc<Mesh>, DVec3)>>,
+    time: f64,
+    steps: u64,
+    timers: [Duration; Stage::WCSPH.len()],
+    bound_by: Vec<(DtBound, u64)>,
+    momentum: MomentumLedger,
+}
+
+/// What one step did.
+#[derive(Clone, Copy, Debug)]
+pub struct StepReport {
+    /// Length of the step (s).
+    pub dt: f64,
+    /// What bounded it.
+    pub bound: DtBound,
+    /// Whether every position is finite.
+    pub finite: bool,
+}
+
+/// Momentum against the impulse from outside (E12, C9): what is missing is the residual.
+#[derive(Clone, Copy, Debug, Default)]
+struct MomentumLedger {
+    start: DVec3,
+    impulse: DVec3,
+    force: DVec3,
+}
+
+impl World {
+    /// Builds the world of a scene on the CPU, lets it settle if the scene asks for it, and evaluates the forces
+    /// at time zero.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the scene, with place and remedy.
+    pub fn from_scene(scene: &Scene) -> Result<Self> {
+        Ok(Self::new(scene.assemble()?))
+    }
+
+    /// Runs an assembled scene.
+    pub fn new(assembly: Assembly) -> Self {
+        let Assembly { model, state, meshes } = assembly;
+        let mut backend: Box<dyn Backend> = Box::new(Cpu::default());
+        backend.upload(state);
+        let mut world = Self {
+            model,
+            backend,
+            meshes,
+            time: 0.0,
+            steps: 0,
+            timers: Default::default(),
+            bound_by: Vec::new(),
+            momentum: MomentumLedger::default(),
+        };
+        world.evaluate();
+        world.settle();
+        let ledger = world.backend.ledger();
+        world.momentum =
+            MomentumLedger { start: ledger.momentum, impulse: DVec3::ZERO, force: ledger.external_force };
+        world.timers = Default::default();
+        world
+    }
+
+    /// One step, no longer than `longest` (s).
+    pub fn step(&mut self, longest: f64) -> StepReport {
+        let (dt, bound) = self.next_dt(longest);
+        let advance = Advance { dt, drag: 0.0 };
+        for (stage, timer) in Stage::WCSPH.into_iter().zip(&mut self.timers) {
+            let start = Instant::now();
+            self.backend.run(stage, &self.model, advance);
+            *timer += start.elapsed();
+        }
+        self.time += dt;
+        self.steps += 1;
+        self.record(dt, bound)
+    }
+
+    /// Steps to `until` (s) exactly: the rest of the way is cut into whole, equal steps, anew after each. Calls
+    /// `each` after every step, which may end the advance by returning `false`.
+    pub fn advance(&mut self, until: f64, mut each: impl FnMut(&Self, StepReport) -> bool) {
+        while self.time < until {
+            let left = until - self.time;
+            let report = self.step(left);
+            if (until - self.time).abs() <= 1e-9 * report.dt {
+                self.time = until;
+            }
+            if !each(self, report) {
+                break;
+            }
+        }
+    }
+
+    /// Length of the next step and what bounds it (E29).
+    fn next_dt(&self, longest: f64) -> (f64, DtBound) {
+        let ledger = self.backend.ledger();
+        let (dt, bound) = self.model.largest_dt(ledger.speed, ledger.acceleration);
+        if dt >= longest {
+            return (longest, DtBound::Frame);
+        }
+        // whole steps: what is left is cut evenly, so that no sliver of a step remains
+        (longest / (longest / dt).ceil(), bound)
+    }
+
+    /// Runs the stages that evaluate forces.
+    fn evaluate(&mut self) {
+        for stage in Stage::WCSPH.into_iter().filter(|s| s.evaluates()) {
+            self.backend.run(stage, &self.model, Advance::default());
+        }
+    }
+
+    /// Before time begins: fluids come to rest under drag while bodies stand still.
+    fn settle(&mut self) {
+        let end = self.model.solver.settle;
+        if end == 0.0 || self.model.fluids.is_empty() {
+            return;
+        }
+        // critical for the slowest sound wave that stands in the domain
+        let height = (self.model.grid.max - self.model.grid.min).abs().max_element();
+        let drag = std::f64::consts::PI * self.model.sound_speed / height;
+        let mut time = 0.0;
+        while time < end {
+            let (dt, _) = self.next_dt(end - time);
+            for stage in Stage::WCSPH {
+                self.backend.run(stage, &self.model, Advance { dt, drag });
+            }
+            time += dt;
+        }
+    }
+
+    fn record(&mut self, dt: f64, bound: DtBound) -> StepReport {
+        let ledger = self.backend.ledger();
+        match self.bound_by.iter_mut().find(|b| b.0 == bound) {
+            Some((_, n)) => *n += 1,
+            None => self.bound_by.push((bound, 1)),
+        }
+        self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force);
+        self.momentum.force = ledger.external_force;
+        StepReport { dt, bound, finite: ledger.nonfinite == 0 }
+    }
+
+    /// Constants.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The present state.
+    pub fn state(&self) -> &State {
+        self.backend.download()
+    }
+
+    /// What the last step left behind.
+    pub fn ledger(&self) -> &Ledger {
+        self.backend.ledger()
+    }
+
+    /// Name of the backend.
+    pub fn backend(&self) -> &'static str {
+        self.backend.name()
+    }
+
+    /// Mesh of each body that was given as one, and the centre of mass in its coordinates (m).
+    pub fn meshes(&self) -> &[Option<(Arc<Mesh>, DVec3)>] {
+        &self.meshes
+    }
+
+    /// Simulated time (s).
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Steps made.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Wall-clock time spent in each stage since the beginning.
+    pub fn timers(&self) -> impl Iterator<Item = (Stage, Duration)> + '_ {
+        Stage::WCSPH.into_iter().zip(self.timers)
+    }
+
+    /// What bounded the steps so far, and how often.
+    pub fn bounds(&self) -> &[(DtBound, u64)] {
+        &self.bound_by
+    }
+
+    /// What is missing between the change of momentum and the impulse from outside, as a fraction of the sum of
+    /// the magnitudes of momenta (C9).
+    pub fn momentum_residual(&self) -> f64 {
+        let ledger = self.backend.ledger();
+        let missing = ledger.momentum - self.momentum.start - self.momentum.impulse;
+        if ledger.momentum_scale > 0.0 { missing.length() / ledger.momentum_scale } else { 0.0 }
+    }
+}
