@@ -93,7 +93,7 @@ impl Solid {
                 .map(|e| e.length_squared())
                 .into_iter()
                 .fold(0.0, f64::max);
-            if (b - a).cross(c - a).length() < 0.02 * longest {
+            if (b - a).cross(c - a).length() < 0.01 * longest {
                 return Err(format!("triangle {t} is a sliver"));
             }
         }
