@@ -1,1 +1,25 @@
 //! Pictures of jetsam worlds.
+//!
+//! [`render`] draws balls on the CPU: no window, no GPU, the same bits for any number of threads. [`color`] turns speeds
+//! and names into colours.
+//!
+//! ```
+//! use glam::Vec3;
+//! use jetsam_view::{Ball, Camera, Options, color, render};
+//!
+//! let balls = [Ball { center: Vec3::ZERO, radius: 0.1, color: color::of_name("monkey-1") }];
+//! let camera = Camera::framing(Vec3::splat(-0.2), Vec3::splat(0.2), Vec3::new(1.0, -2.0, 1.0), 0.7, 4.0 / 3.0);
+//! let image = render(&balls, &camera, 160, 120, &Options::default());
+//! assert_eq!(image.rgba.len(), 160 * 120 * 4);
+//! ```
+#![forbid(unsafe_code)]
+
+mod camera;
+pub mod color;
+mod image;
+mod raster;
+mod splat;
+
+pub use camera::Camera;
+pub use image::{Image, ImageError};
+pub use splat::{Ball, Facet, Line, Options, box_edges, facets, render};
