@@ -23,7 +23,7 @@ pub fn oklch(l: f32, c: f32, h: f32) -> [f32; 3] {
 /// grows evenly with `t`.
 pub fn water(t: f32) -> [f32; 3] {
     let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
-    oklch(0.45 + 0.52 * t, 0.145 - 0.11 * t * t, 0.715 - 0.14 * t)
+    oklch(0.45 + 0.52 * t, 0.145 - 0.11 * t * t, 0.705 - 0.13 * t)
 }
 
 /// The colour of the body called `name`, the same in every run: warm, so that it stands out from water.

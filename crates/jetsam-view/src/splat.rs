@@ -213,6 +213,9 @@ impl<'a> Scene<'a> {
         let tips = sound()
             .flat_map(|ball| [ball.center - ball.radius, ball.center + ball.radius])
             .chain(corners);
+        // A particle lost at the end of the world must not cost the others their shadows.
+        let far = 2.0 * camera.eye.distance(camera.target);
+        let tips = tips.filter(|p| p.distance(camera.target) < far);
         let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let (low, high) = tips.fold(empty, |(low, high), p| (low.min(p), high.max(p)));
         let (low, high) = if low.is_finite() {
