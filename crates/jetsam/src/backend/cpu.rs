@@ -6,7 +6,7 @@
 use super::Backend;
 use crate::integrate::{Advance, bodies, particles};
 use crate::interact::cells::{Cells, Grid};
-use crate::interact::neighbours::{Around, NeighbourChunk};
+use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
 use crate::interact::{CHUNK, boundary, density, forces, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
@@ -132,7 +132,7 @@ impl Cpu {
 
     /// Sorts every kind. Fluids change places for good; particles of bodies are copied from their slots.
     fn sort(&mut self, grid: &Grid) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let p = &mut self.state.particles;
         let from = &mut self.spare;
         let fluid = p.segment(Kind::Fluid);
         let cells = &mut self.cells[Kind::Fluid as usize];
@@ -218,14 +218,20 @@ impl Cpu {
             if kind == Kind::Fluid {
                 chunks.par_iter_mut().zip(chunks_mut!(p.density, ..n)).enumerate().for_each(
                     |(c, (chunk, density))| {
-                        dispatch!(level, simd => {
-                            density::fluid_chunk(simd, model, around, members(c), chunk, density);
+                        with_scratch(|scratch| {
+                            dispatch!(level, simd => {
+                                density::fluid_chunk(simd, scratch, model, around, members(c), chunk, density);
+                            });
                         });
                     },
                 );
             } else {
                 chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
-                    dispatch!(level, simd => density::body_chunk(simd, around, kind, members(c), chunk));
+                    with_scratch(|scratch| {
+                        dispatch!(level, simd => {
+                            density::body_chunk(simd, scratch, around, kind, members(c), chunk);
+                        });
+                    });
                 });
             }
         }

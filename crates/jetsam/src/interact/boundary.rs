@@ -58,9 +58,9 @@ pub fn chunk<S: Simd>(
                 weight[l] += w[l];
             }
         }
-        let weight = sum(&weight);
+        let weight = sum(simd, &weight);
         if weight > 0.0 {
-            *share = (sum(&total) / weight).max(0.0);
+            *share = (sum(simd, &total) / weight).max(0.0);
         }
     }
 }

@@ -4,7 +4,7 @@
 //! any rest density stand in it side by side: `D_i = sum_j V_j W_ij`.
 
 use super::lanes::{LANES, Lanes, sum};
-use super::neighbours::{Around, NeighbourChunk, Runs};
+use super::neighbours::{Around, NeighbourChunk, Runs, Scratch};
 use crate::laws::kernel::Kernel;
 use crate::model::Model;
 use crate::scene::Coupling;
@@ -16,6 +16,7 @@ use std::ops::Range;
 #[inline(always)]
 pub fn fluid_chunk<S: Simd>(
     simd: S,
+    scratch: &mut Scratch,
     model: &Model,
     around: Around,
     members: Range<usize>,
@@ -31,12 +32,12 @@ pub fn fluid_chunk<S: Simd>(
         Coupling::Spring => &[Kind::Static],
     };
     let start = members.start;
-    chunk.find(simd, around, Kind::Fluid, members, |cell, runs, list, r_sq, base| {
+    chunk.find(simd, scratch, around, Kind::Fluid, members, #[inline(always)] |cell, runs, list, r_sq, base| {
         for (i, runs) in cell.zip(runs) {
-            let mut total = volume * sum_w(kernel, inverse, r_sq, shifted(runs, Kind::Fluid, base));
+            let mut total = volume * sum_w(simd, kernel, inverse, r_sq, shifted(runs, Kind::Fluid, base));
             for &kind in bodies {
                 if runs.count(kind) > 0 {
-                    total += sum_vw(kernel, inverse, r_sq, list, runs.padded(kind), base, around.records);
+                    total += sum_vw(simd, kernel, inverse, r_sq, list, runs.padded(kind), base, around.records);
                 }
             }
             density[i - start] = factor * total;
@@ -46,8 +47,15 @@ pub fn fluid_chunk<S: Simd>(
 
 /// Neighbours of a chunk of bodies' particles.
 #[inline(always)]
-pub fn body_chunk<S: Simd>(simd: S, around: Around, kind: Kind, members: Range<usize>, chunk: &mut NeighbourChunk) {
-    chunk.find(simd, around, kind, members, |_, _, _, _, _| {});
+pub fn body_chunk<S: Simd>(
+    simd: S,
+    scratch: &mut Scratch,
+    around: Around,
+    kind: Kind,
+    members: Range<usize>,
+    chunk: &mut NeighbourChunk,
+) {
+    chunk.find(simd, scratch, around, kind, members, |_, _, _, _, _| {});
 }
 
 #[inline(always)]
@@ -58,7 +66,7 @@ fn shifted(runs: &Runs, kind: Kind, base: usize) -> Range<usize> {
 
 /// `sum w(s)` over a run of equal volumes.
 #[inline(always)]
-fn sum_w(kernel: Kernel, inverse: f32, r_sq: &[f32], run: Range<usize>) -> f32 {
+fn sum_w<S: Simd>(simd: S, kernel: Kernel, inverse: f32, r_sq: &[f32], run: Range<usize>) -> f32 {
     let mut total: Lanes = [0.0; LANES];
     for block in r_sq[run].as_chunks::<LANES>().0 {
         let w = weights(kernel, inverse, block);
@@ -66,12 +74,14 @@ fn sum_w(kernel: Kernel, inverse: f32, r_sq: &[f32], run: Range<usize>) -> f32 {
             total[l] += w[l];
         }
     }
-    sum(&total)
+    sum(simd, &total)
 }
 
 /// `sum V_j w(s)` over a run.
 #[inline(always)]
-fn sum_vw(
+#[allow(clippy::too_many_arguments)]
+fn sum_vw<S: Simd>(
+    simd: S,
     kernel: Kernel,
     inverse: f32,
     r_sq: &[f32],
@@ -88,7 +98,7 @@ fn sum_vw(
             total[l] += w[l] * records[j[l] as usize].volume;
         }
     }
-    sum(&total)
+    sum(simd, &total)
 }
 
 /// `w(s)` of sixteen squared distances.
@@ -98,7 +108,7 @@ pub fn weights(kernel: Kernel, inverse: f32, r_sq: &Lanes) -> Lanes {
     for l in 0..LANES {
         s[l] = r_sq[l].sqrt() * inverse;
     }
-    each_lane(kernel, &s, |k, s| k.w(s))
+    each_lane(kernel, &s, #[inline(always)] |k, s| k.w(s))
 }
 
 /// A kernel function on sixteen lanes: the choice of kernel is made outside the lane loop.

@@ -90,9 +90,9 @@ fn on_fluid<S: Simd>(simd: S, input: &Input, chunk: &NeighbourChunk, runs: &Runs
             });
         }
     }
-    let mut acceleration = (pairs.force() + contacts) / me.mass + model.gravity_f32();
+    let mut acceleration = (pairs.force(simd) + contacts) / me.mass + model.gravity_f32();
     acceleration += fields(model, own);
-    (acceleration, pairs.carry())
+    (acceleration, pairs.carry(simd))
 }
 
 /// Force on a particle of a body.
@@ -115,7 +115,7 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, 
             };
             pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);
         }
-        force += pairs.force();
+        force += pairs.force(simd);
     } else {
         let fluids = &chunk.list[runs.exact(Kind::Fluid)];
         force += sum_contacts(input, own, fluids, |fluid| model.coupling_pair(fluid, owner));
@@ -274,7 +274,7 @@ impl<'a> Pairs<'a> {
         for l in 0..LANES {
             s[l] = r_sq[l].sqrt() * self.inverse;
         }
-        let shape = each_lane(self.kernel, &s, |k, s| k.g(s));
+        let shape = each_lane(self.kernel, &s, #[inline(always)] |k, s| k.g(s));
         let (mut along_d, mut along_v) = ([0.0; LANES], [0.0; LANES]);
         for l in 0..LANES {
             let g = self.g_factor * shape[l];
@@ -285,7 +285,7 @@ impl<'a> Pairs<'a> {
             along_v[l] = fluid::viscosity_laminar(volumes, mu_sum[l], r_sq[l], self.softening, g);
         }
         if let Some(factor) = self.mueller {
-            let laplacian = each_lane(Kernel::Viscosity, &s, |k, s| k.g(s));
+            let laplacian = each_lane(Kernel::Viscosity, &s, #[inline(always)] |k, s| k.g(s));
             for l in 0..LANES {
                 let volumes = own.volume * other.volume[l];
                 along_v[l] = fluid::viscosity_mueller(volumes, mu_sum[l], factor * laplacian[l]);
@@ -308,12 +308,12 @@ impl<'a> Pairs<'a> {
     }
 
     #[inline(always)]
-    fn force(&self) -> Vec3 {
-        Vec3::new(sum(&self.force[0]), sum(&self.force[1]), sum(&self.force[2]))
+    fn force<S: Simd>(&self, simd: S) -> Vec3 {
+        Vec3::new(sum(simd, &self.force[0]), sum(simd, &self.force[1]), sum(simd, &self.force[2]))
     }
 
     #[inline(always)]
-    fn carry(&self) -> Vec3 {
-        Vec3::new(sum(&self.carry[0]), sum(&self.carry[1]), sum(&self.carry[2]))
+    fn carry<S: Simd>(&self, simd: S) -> Vec3 {
+        Vec3::new(sum(simd, &self.carry[0]), sum(simd, &self.carry[1]), sum(simd, &self.carry[2]))
     }
 }

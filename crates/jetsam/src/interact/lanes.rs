@@ -18,16 +18,13 @@ pub fn padded(n: usize) -> usize {
     n.next_multiple_of(LANES)
 }
 
-/// Sum of the lanes in a fixed order: halves onto each other.
+/// Sum of the lanes in a fixed order: halves onto each other. By hand, as the compiler would not unroll it.
 #[inline(always)]
-pub fn sum(a: &Lanes) -> f32 {
-    let mut v = *a;
-    for half in [8, 4, 2, 1] {
-        for l in 0..half {
-            v[l] += v[l + half];
-        }
-    }
-    v[0]
+pub fn sum<S: Simd>(simd: S, a: &Lanes) -> f32 {
+    let (low, high) = f32x16::load_array_ref(simd, a).split();
+    let (low, high) = (low + high).split();
+    let v = (low + high).to_array();
+    (v[0] + v[2]) + (v[1] + v[3])
 }
 
 /// Sixteen records side by side.
@@ -45,45 +42,50 @@ pub struct Transposed {
 /// Loads the records named by 16 indices: 16 whole-record loads and three rounds of unzipping.
 #[inline(always)]
 pub fn gather<S: Simd>(simd: S, records: &[Record], list: &[u32; LANES]) -> Transposed {
-    let row = |l: usize| -> f32x8<S> {
-        f32x8::from_slice(simd, bytemuck::cast_ref::<Record, [f32; 8]>(&records[list[l] as usize]))
-    };
-    let pair = |l: usize| -> f32x16<S> { row(2 * l).combine(row(2 * l + 1)) };
-    let rows = [pair(0), pair(1), pair(2), pair(3), pair(4), pair(5), pair(6), pair(7)];
-    let unzip4 = |a: &[f32x16<S>; 8]| {
-        (
-            [
-                a[0].unzip_low(a[1]),
-                a[2].unzip_low(a[3]),
-                a[4].unzip_low(a[5]),
-                a[6].unzip_low(a[7]),
-            ],
-            [
-                a[0].unzip_high(a[1]),
-                a[2].unzip_high(a[3]),
-                a[4].unzip_high(a[5]),
-                a[6].unzip_high(a[7]),
-            ],
-        )
-    };
-    let unzip2 = |a: &[f32x16<S>; 4]| {
-        (
-            [a[0].unzip_low(a[1]), a[2].unzip_low(a[3])],
-            [a[0].unzip_high(a[1]), a[2].unzip_high(a[3])],
-        )
-    };
+    let r = [
+        pair(simd, records, list[0], list[1]),
+        pair(simd, records, list[2], list[3]),
+        pair(simd, records, list[4], list[5]),
+        pair(simd, records, list[6], list[7]),
+        pair(simd, records, list[8], list[9]),
+        pair(simd, records, list[10], list[11]),
+        pair(simd, records, list[12], list[13]),
+        pair(simd, records, list[14], list[15]),
+    ];
     // component c = 4 c2 + 2 c1 + c0: the first round splits by c0, the second by c1, the third by c2
-    let (even, odd) = unzip4(&rows);
-    let (c04, c26) = unzip2(&even);
-    let (c15, c37) = unzip2(&odd);
-    let low = |a: [f32x16<S>; 2]| a[0].unzip_low(a[1]).to_array();
-    let high = |a: [f32x16<S>; 2]| a[0].unzip_high(a[1]).to_array();
+    let (a0, b0) = unzip(r[0], r[1]);
+    let (a1, b1) = unzip(r[2], r[3]);
+    let (a2, b2) = unzip(r[4], r[5]);
+    let (a3, b3) = unzip(r[6], r[7]);
+    let (c04, c26) = (unzip(a0, a1), unzip(a2, a3));
+    let (c15, c37) = (unzip(b0, b1), unzip(b2, b3));
+    let (c0, c4) = unzip(c04.0, c26.0);
+    let (c2, c6) = unzip(c04.1, c26.1);
+    let (c1, c5) = unzip(c15.0, c37.0);
+    let (c3, c7) = unzip(c15.1, c37.1);
     Transposed {
-        x: [low(c04), low(c15), low(c26)],
-        volume: low(c37),
-        v: [high(c04), high(c15), high(c26)],
-        share: high(c37),
+        x: [c0.to_array(), c1.to_array(), c2.to_array()],
+        volume: c3.to_array(),
+        v: [c4.to_array(), c5.to_array(), c6.to_array()],
+        share: c7.to_array(),
     }
+}
+
+/// Two records in one vector.
+#[inline(always)]
+fn pair<S: Simd>(simd: S, records: &[Record], a: u32, b: u32) -> f32x16<S> {
+    row(simd, records, a).combine(row(simd, records, b))
+}
+
+#[inline(always)]
+fn row<S: Simd>(simd: S, records: &[Record], index: u32) -> f32x8<S> {
+    f32x8::load_array_ref(simd, bytemuck::cast_ref::<Record, [f32; 8]>(&records[index as usize]))
+}
+
+/// Even and odd elements of two vectors on end.
+#[inline(always)]
+fn unzip<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+    (a.unzip_low(b), a.unzip_high(b))
 }
 
 #[cfg(test)]

@@ -78,6 +78,14 @@ thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
+/// Lends the thread's scratch to `work`. Dispatch to wide instructions belongs inside of `work`: what is called
+/// through a thread-local is compiled for the plain machine.
+pub fn with_scratch(work: impl FnOnce(&mut Scratch)) {
+    let mut scratch = SCRATCH.take();
+    work(&mut scratch);
+    SCRATCH.set(scratch);
+}
+
 /// What the search reads.
 #[derive(Clone, Copy)]
 pub struct Around<'a> {
@@ -111,6 +119,7 @@ impl NeighbourChunk {
     pub fn find<S: Simd>(
         &mut self,
         simd: S,
+        scratch: &mut Scratch,
         around: Around,
         kind: Kind,
         members: Range<usize>,
@@ -118,53 +127,49 @@ impl NeighbourChunk {
     ) {
         self.runs.clear();
         let mut used = 0;
-        SCRATCH.with_borrow_mut(|scratch| {
-            let mut from = members.start;
-            while from < members.end {
-                let cell = around.grid.coordinates(around.records[from].x);
-                let mut to = from + 1;
-                while to < members.end && around.grid.coordinates(around.records[to].x) == cell {
-                    to += 1;
-                }
-                let mut candidates = 0;
-                for &k in acting(kind) {
-                    scratch.tile[k as usize].pack(&around, k, cell);
-                    candidates += padded(scratch.tile[k as usize].len);
-                }
-                let base = used;
-                let room = (to - from) * (candidates + LANES);
-                if self.list.len() < base + room {
-                    self.list.resize(base + room, 0);
-                }
-                if scratch.r_sq.len() < room {
-                    scratch.r_sq.resize(room, 0.0);
-                }
-                let first_run = self.runs.len();
-                for i in from..to {
-                    let mut runs = Runs { begin: used as u32, count: [0; Kind::COUNT] };
-                    for &k in acting(kind) {
-                        let other = kind == Kind::Rigid && k == Kind::Rigid;
-                        let n = scratch.tile[k as usize].search(
-                            simd,
-                            around.records[i].x,
-                            other.then(|| around.owner[i]),
-                            around.support,
-                            &mut self.list[used..],
-                            &mut scratch.r_sq[used - base..],
-                        );
-                        for pad in n..padded(n) {
-                            self.list[used + pad] = i as u32;
-                            scratch.r_sq[used - base + pad] = around.support * around.support;
-                        }
-                        runs.count[k as usize] = n as u16;
-                        used += padded(n);
-                    }
-                    self.runs.push(runs);
-                }
-                each_cell(from..to, &self.runs[first_run..], &self.list, &scratch.r_sq, base);
-                from = to;
+        let mut from = members.start;
+        while from < members.end {
+            let cell = around.grid.coordinates(around.records[from].x);
+            let mut to = from + 1;
+            while to < members.end && around.grid.coordinates(around.records[to].x) == cell {
+                to += 1;
             }
-        });
+            let mut candidates = 0;
+            for &k in acting(kind) {
+                scratch.tile[k as usize].pack(&around, k, cell);
+                candidates += padded(scratch.tile[k as usize].len);
+            }
+            let base = used;
+            let room = (to - from) * (candidates + LANES);
+            if self.list.len() < base + room {
+                self.list.resize(base + room, 0);
+            }
+            if scratch.r_sq.len() < room {
+                scratch.r_sq.resize(room, 0.0);
+            }
+            let first_run = self.runs.len();
+            for i in from..to {
+                let mut runs = Runs { begin: used as u32, count: [0; Kind::COUNT] };
+                for &k in acting(kind) {
+                    let tile = &scratch.tile[k as usize];
+                    if tile.len == 0 {
+                        continue;
+                    }
+                    let not = if kind == Kind::Rigid && k == Kind::Rigid { Some(around.owner[i]) } else { None };
+                    let (list, r_sq) = (&mut self.list[used..], &mut scratch.r_sq[used - base..]);
+                    let n = tile.search(simd, around.records[i].x, not, around.support, list, r_sq);
+                    for pad in n..padded(n) {
+                        list[pad] = i as u32;
+                        r_sq[pad] = around.support * around.support;
+                    }
+                    runs.count[k as usize] = n as u16;
+                    used += padded(n);
+                }
+                self.runs.push(runs);
+            }
+            each_cell(from..to, &self.runs[first_run..], &self.list, &scratch.r_sq, base);
+            from = to;
+        }
     }
 }
 
@@ -183,21 +188,16 @@ impl Tile {
             let Some((z, shift_z)) = image(grid, 2, cell[2] + dz) else { continue };
             for dy in reach(1) {
                 let Some((y, shift_y)) = image(grid, 1, cell[1] + dy) else { continue };
-                let (low, high) = (cell[0] - 1, cell[0] + 1);
-                let last = grid.cells[0] - 1;
-                let mut row = |from: i32, to: i32, shift_x: f32| {
-                    let begin = cells.start[grid.index([from, y, z])];
-                    let end = cells.start[grid.index([to, y, z]) + 1];
-                    let first = around.first[kind as usize];
-                    self.append(around, first + begin as usize..first + end as usize, [shift_x, shift_y, shift_z]);
-                };
-                row(low.max(0), high.min(last), 0.0);
+                let row = [y, z];
+                let (low, high, last) = (cell[0] - 1, cell[0] + 1, grid.cells[0] - 1);
+                let shift = [0.0, shift_y, shift_z];
+                self.append(around, cells, kind, row, low.max(0), high.min(last), shift);
                 let period = grid.period[0];
                 if period > 0.0 && low < 0 {
-                    row(last, last, -period);
+                    self.append(around, cells, kind, row, last, last, [-period, shift_y, shift_z]);
                 }
                 if period > 0.0 && high > last {
-                    row(0, 0, period);
+                    self.append(around, cells, kind, row, 0, 0, [period, shift_y, shift_z]);
                 }
             }
         }
@@ -213,6 +213,7 @@ impl Tile {
         }
     }
 
+    #[inline(always)]
     fn reserve(&mut self, len: usize) {
         if self.x.len() < len {
             for a in [&mut self.x, &mut self.y, &mut self.z] {
@@ -223,23 +224,39 @@ impl Tile {
         }
     }
 
+    /// Packs the cells `from..=to` of a row.
     #[inline(always)]
-    fn append(&mut self, around: &Around, range: Range<usize>, shift: [f32; 3]) {
-        let at = self.len;
-        self.len += range.len();
+    #[allow(clippy::too_many_arguments)] // one caller, three calls
+    fn append(
+        &mut self,
+        around: &Around,
+        cells: &Cells,
+        kind: Kind,
+        [y, z]: [i32; 2],
+        from: i32,
+        to: i32,
+        shift: [f32; 3],
+    ) {
+        let first = around.first[kind as usize];
+        let begin = first + cells.start[around.grid.index([from, y, z])] as usize;
+        let end = first + cells.start[around.grid.index([to, y, z]) + 1] as usize;
+        let (at, n) = (self.len, end - begin);
+        if n == 0 {
+            return;
+        }
+        self.len += n;
         self.reserve(padded(self.len));
-        let n = range.len();
-        let records = &around.records[range.clone()];
         let (x, y, z) = (&mut self.x[at..at + n], &mut self.y[at..at + n], &mut self.z[at..at + n]);
-        for (k, r) in records.iter().enumerate() {
+        let (index, owner) = (&mut self.index[at..at + n], &mut self.owner[at..at + n]);
+        let (records, owners) = (&around.records[begin..end], &around.owner[begin..end]);
+        for k in 0..n {
+            let r = &records[k];
             x[k] = r.x[0] + shift[0];
             y[k] = r.x[1] + shift[1];
             z[k] = r.x[2] + shift[2];
+            index[k] = (begin + k) as u32;
+            owner[k] = owners[k];
         }
-        for (k, j) in range.clone().enumerate() {
-            self.index[at + k] = j as u32;
-        }
-        self.owner[at..at + n].copy_from_slice(&around.owner[range]);
     }
 
     /// Appends to `list` the candidates closer than `support` to `x` (of another owner than `not`), with their

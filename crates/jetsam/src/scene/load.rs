@@ -4,7 +4,6 @@ use super::Scene;
 use crate::error::{Error, Result};
 use crate::params::{self, PARAMS};
 use miette::NamedSource;
-use serde::Serialize as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
@@ -242,8 +241,6 @@ impl Scene {
     /// # Errors
     /// None in practice: every scene can be written.
     pub fn to_toml(&self) -> std::result::Result<String, toml::ser::Error> {
-        let mut text = String::new();
-        self.serialize(toml::Serializer::pretty(&mut text))?;
-        Ok(text)
+        toml::to_string_pretty(self)
     }
 }
