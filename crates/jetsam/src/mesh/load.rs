@@ -23,8 +23,6 @@ pub mod limits {
     pub const VERTICES: u64 = 100_000_000;
     /// Triangles.
     pub const TRIANGLES: u64 = 100_000_000;
-    /// Nodes of a glTF scene graph that carry a mesh.
-    pub const NODES: u64 = 100_000;
 }
 
 /// A mesh file format.
@@ -279,7 +277,8 @@ fn gltf(bytes: &[u8], folder: Option<&Path>) -> Result<Mesh, MeshFault> {
         buffers.push(data.map_err(|e| fault(e.to_string()))?.0);
     }
     let mut mesh = Mesh::default();
-    let (mut visited, mut stack) = (0, Vec::new());
+    let mut visited = vec![false; file.document.nodes().len()];
+    let mut stack = Vec::new();
     let scene = file
         .document
         .default_scene()
@@ -288,14 +287,17 @@ fn gltf(bytes: &[u8], folder: Option<&Path>) -> Result<Mesh, MeshFault> {
         scene
             .iter()
             .flat_map(|s| s.nodes())
-            .map(|n| (n, DMat4::IDENTITY, 0)),
+            .map(|n| (n, DMat4::IDENTITY)),
     );
-    while let Some((node, parent, depth)) = stack.pop() {
-        visited += 1;
-        at_most("nodes", visited, limits::NODES)?;
-        at_most("levels of nodes", depth, 1000)?;
+    while let Some((node, parent)) = stack.pop() {
+        if std::mem::replace(&mut visited[node.index()], true) {
+            return Err(fault(format!(
+                "node {} has two parents or is its own ancestor",
+                node.index()
+            )));
+        }
         let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
-        stack.extend(node.children().map(|child| (child, world, depth + 1)));
+        stack.extend(node.children().map(|child| (child, world)));
         for primitive in node.mesh().iter().flat_map(|m| m.primitives()) {
             add_primitive(&mut mesh, &primitive, &buffers, world).map_err(&fault)?;
         }
@@ -368,6 +370,7 @@ fn add_primitive(
     }
     let corner = |i: usize| base + indices[i];
     let n = indices.len();
+    let first = mesh.triangles.len();
     match part.mode() {
         Mode::Triangles => mesh
             .triangles
@@ -378,6 +381,11 @@ fn add_primitive(
         _ => mesh
             .triangles
             .extend((2..n).map(|i| [i - 2, i - 1 + i % 2, i - i % 2].map(corner))),
+    }
+    if world.determinant() < 0.0 {
+        mesh.triangles[first..]
+            .iter_mut()
+            .for_each(|t| t.swap(1, 2));
     }
     Ok(())
 }

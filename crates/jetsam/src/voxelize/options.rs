@@ -144,4 +144,17 @@ pub enum VoxelizeError {
         /// A spacing that needs no more than that.
         fits: f64,
     },
+    /// A surface sample would be too large.
+    #[error("a spacing of {spacing} needs {points:.0} points, more than the {limit} allowed")]
+    #[diagnostic(code(jetsam::voxelize::memory), help("a spacing of {fits:.3e} fits"))]
+    TooManyPoints {
+        /// The spacing asked for.
+        spacing: f64,
+        /// The points it needs.
+        points: f64,
+        /// The points allowed.
+        limit: u64,
+        /// A spacing that needs no more than that.
+        fits: f64,
+    },
 }

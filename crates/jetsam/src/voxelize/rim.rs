@@ -135,6 +135,16 @@ fn relative(a: Fixed, p: Fixed) -> DVec3 {
 /// [`super::raster`] decides on which side it is.
 fn strip_angle(side: &Side, p: Fixed) -> f64 {
     let (a, b) = (relative(side.a, p), relative(side.b, p));
+    // An end straight behind p: the half-open rule puts it at (-e², -e³) in y and z, and only directions are left.
+    let behind = |v: Fixed| v[1] == p[1] && v[2] == p[2] && v[0] < p[0];
+    let sign = |x: f64| f64::MIN_POSITIVE.copysign(x);
+    let or_tie = |x: f64, tie: f64| if x == 0.0 { sign(tie) } else { x };
+    match (behind(side.a), behind(side.b)) {
+        (true, true) => return 0.0,
+        (true, false) => return 2.0 * or_tie(-b.z, b.y).atan2(-b.y),
+        (false, true) => return 2.0 * or_tie(a.z, -a.y).atan2(-a.y),
+        (false, false) => {}
+    }
     let (la, lb) = (a.length(), b.length());
     let denominator = la * lb + a.dot(b) + a.x * lb + b.x * la;
     let (left, right) = (a.y * b.z, a.z * b.y);

@@ -2,14 +2,14 @@
 //!
 //! w(p) is the sum of the signed solid angles of all triangles seen from p, over 4π (Jacobson, Kavan & Sorkine-Hornung
 //! 2013): 1 inside a closed surface, 0 outside, and something between near holes. [`winding_number`] sums all of them;
-//! [`WindingTree`] sums near triangles exactly and far clusters by the first two terms of their expansion (Barill,
-//! Dickson, Schmidt, Levin & Jacobson 2018).
+//! [`WindingTree`] sums near triangles exactly and far clusters by the first three terms of their expansion
+//! (Barill, Dickson, Schmidt, Levin & Jacobson 2018).
 
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, outer};
 
 /// Solid angle, in steradians, of a triangle seen from the origin (Van Oosterom & Strackee 1983): positive where its
 /// corners run counter-clockwise seen from the far side.
@@ -44,11 +44,32 @@ struct Node {
     normal: DVec3,
     /// Sum of (area · normal)(centroid - center)ᵀ.
     moment: DMat3,
+    /// For each component of the normal, the integral of it times d dᵀ, with d from the centre.
+    second: [DMat3; 3],
     rim: f64,
     first: u32,
     count: u32,
-    /// Index of the second child; the first follows its parent. Zero: a leaf.
-    second: u32,
+    /// Index of the other child; one follows its parent. Zero: a leaf.
+    other: u32,
+}
+
+impl Node {
+    /// The cluster's solid angle seen from -d, at distance r: the field d/r³ and its first two derivatives, against
+    /// the moments of the normals.
+    fn far(&self, d: DVec3, r: f64) -> f64 {
+        let (i2, i3) = (1.0 / (r * r), 1.0 / (r * r * r));
+        let trace = |m: &DMat3| m.x_axis.x + m.y_axis.y + m.z_axis.z;
+        let first = trace(&self.moment) - 3.0 * i2 * d.dot(self.moment * d);
+        let (mut mixed, mut full, mut traces) = (0.0, 0.0, 0.0);
+        for (i, m) in self.second.iter().enumerate() {
+            let along = *m * d;
+            mixed += along[i];
+            full += d[i] * d.dot(along);
+            traces += trace(m) * d[i];
+        }
+        let second = i2 * (7.5 * i2 * full - 1.5 * (2.0 * mixed + traces));
+        i3 * (self.normal.dot(d) + first + second)
+    }
 }
 
 /// A winding number and how fast it can change.
@@ -103,17 +124,13 @@ impl WindingTree {
             let r2 = d.length_squared();
             if r2 > (beta * node.radius).powi(2) {
                 let r = r2.sqrt();
-                let (r3, trace) = (
-                    r2 * r,
-                    node.moment.x_axis.x + node.moment.y_axis.y + node.moment.z_axis.z,
-                );
-                angle += (node.normal.dot(d) + trace - 3.0 * d.dot(node.moment * d) / r2) / r3;
+                angle += node.far(d, r);
                 if node.rim > 0.0 {
                     rate += node.rim / (r - node.radius).powi(2);
                     nearest = nearest.min(r - node.radius);
                 }
-            } else if node.second > 0 {
-                pending[depth] = node.second;
+            } else if node.other > 0 {
+                pending[depth] = node.other;
                 depth += 1;
                 at += 1;
                 continue;
@@ -173,11 +190,15 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
     } else {
         0.5 * (lo + hi)
     };
-    let (mut radius, mut moment) = (0.0f64, DMat3::ZERO);
+    let (mut radius, mut moment, mut second) = (0.0f64, DMat3::ZERO, [DMat3::ZERO; 3]);
     for (t, _) in items.iter() {
         let (n, centroid) = parts(t);
         radius = t.iter().fold(radius, |r, v| r.max(v.distance(center)));
-        moment += crate::mesh::outer(n, centroid - center);
+        moment += outer(n, centroid - center);
+        let [a, b, c] = t.map(|v| v - center);
+        let sum = a + b + c;
+        let square = (outer(a, a) + outer(b, b) + outer(c, c) + outer(sum, sum)) * (1.0 / 12.0);
+        (0..3).for_each(|i| second[i] += square * n[i]);
     }
     let at = nodes.len();
     nodes.push(Node {
@@ -188,7 +209,8 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
         rim,
         first,
         count: items.len() as u32,
-        second: 0,
+        second,
+        other: 0,
     });
     if items.len() > LEAF {
         let axis = (hi - lo).max_position();
@@ -197,7 +219,7 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
         items.sort_by(|a, b| key(&a.0).total_cmp(&key(&b.0)));
         let (left, right) = items.split_at_mut(middle);
         build(left, first, nodes);
-        nodes[at].second = nodes.len() as u32;
+        nodes[at].other = nodes.len() as u32;
         build(right, first + middle as u32, nodes);
     }
 }
