@@ -134,7 +134,7 @@ fn glb(mesh: &Mesh, nodes: &str) -> Vec<u8> {
             .flatten()
             .flat_map(|v| (*v as u16).to_le_bytes()),
     );
-    while bin.len() % 4 != 0 {
+    while !bin.len().is_multiple_of(4) {
         bin.push(0);
     }
     let n = mesh.vertices.len();
@@ -151,7 +151,7 @@ fn glb(mesh: &Mesh, nodes: &str) -> Vec<u8> {
         2 * m
     )
     .into_bytes();
-    while json.len() % 4 != 0 {
+    while !json.len().is_multiple_of(4) {
         json.push(b' ');
     }
     let mut bytes = b"glTF".to_vec();

@@ -266,8 +266,11 @@ fn ply(bytes: &[u8]) -> Result<Mesh, MeshFault> {
 
 fn gltf(bytes: &[u8], folder: Option<&Path>) -> Result<Mesh, MeshFault> {
     let fault = malformed("glTF");
-    let file = gltf::Gltf::from_slice(bytes).map_err(|e| fault(e.to_string()))?;
-    let mut blob = file.blob;
+    let (json, mut blob) = match bytes.starts_with(b"glTF") {
+        true => glb_chunks(bytes).ok_or_else(|| fault("the GLB container is damaged".into()))?,
+        false => (bytes, None),
+    };
+    let file = gltf::Gltf::from_slice(json).map_err(|e| fault(e.to_string()))?;
     let mut buffers = Vec::new();
     for buffer in file.document.buffers() {
         if let gltf::buffer::Source::Uri(uri) = buffer.source() {
@@ -305,6 +308,27 @@ fn gltf(bytes: &[u8], folder: Option<&Path>) -> Result<Mesh, MeshFault> {
         at_most("triangles", mesh.triangles.len() as u64, limits::TRIANGLES)?;
     }
     Ok(mesh)
+}
+
+/// The JSON chunk of a GLB, and the binary one if there is one.
+fn glb_chunks(bytes: &[u8]) -> Option<(&[u8], Option<Vec<u8>>)> {
+    let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+    let chunk = |at: usize| {
+        let data = bytes.get(at + 8..)?.get(..word(at)? as usize)?;
+        Some((word(at + 4)?, data))
+    };
+    let (kind, json) = chunk(12)?;
+    if word(4)? != 2 || kind != u32::from_le_bytes(*b"JSON") || json.starts_with(b"glTF") {
+        return None;
+    }
+    let binary = 20 + json.len().next_multiple_of(4);
+    let blob = match chunk(binary) {
+        Some((kind, data)) if kind == u32::from_le_bytes(*b"BIN\0") => Some(data.to_vec()),
+        Some(_) => None,
+        None if binary < bytes.len() => return None,
+        None => None,
+    };
+    Some((json, blob))
 }
 
 /// Buffers may lie in the file itself or beside it, nowhere else.

@@ -164,7 +164,7 @@ pub(crate) fn set_run(row: &mut [u64], from: u32, to: u32) {
 
 /// Clears what lies beyond the `nx` cells of a row.
 fn mask_row(row: &mut [u64], nx: u32) {
-    if let Some(last) = row.last_mut().filter(|_| nx % 64 != 0) {
+    if let Some(last) = row.last_mut().filter(|_| !nx.is_multiple_of(64)) {
         *last &= !0 >> (64 - nx % 64);
     }
 }
@@ -172,7 +172,7 @@ fn mask_row(row: &mut [u64], nx: u32) {
 /// ORs a row with itself shifted by up to `m` cells both ways.
 fn spread_row(row: &mut [u64], m: u32, nx: u32, beyond: bool) {
     for _ in 0..m {
-        if let Some(last) = row.last_mut().filter(|_| beyond && nx % 64 != 0) {
+        if let Some(last) = row.last_mut().filter(|_| beyond && !nx.is_multiple_of(64)) {
             *last |= !0 << (nx % 64);
         }
         let mut left = u64::from(beyond);

@@ -95,10 +95,10 @@ impl VoxelizeOptions {
             _ => {}
         }
         match self.shell {
-            Some(t) if !positive(t) => return bad("shell", t.to_string()),
-            _ if !self.offset.is_finite() => return bad("offset", self.offset.to_string()),
+            Some(t) if !positive(t) => bad("shell", t.to_string()),
+            _ if !self.offset.is_finite() => bad("offset", self.offset.to_string()),
             _ if !(self.rotation.is_finite() && self.rotation.length() > 0.0) => {
-                return bad("rotation", self.rotation.to_string());
+                bad("rotation", self.rotation.to_string())
             }
             _ => Ok(()),
         }

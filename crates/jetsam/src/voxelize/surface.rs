@@ -36,7 +36,7 @@ pub fn sample_surface(mesh: &Mesh, spacing: f64, seed: u64) -> Result<Vec<DVec3>
     }
     let area = mesh.area();
     let wanted = area / (spacing * spacing);
-    if !(wanted < MOST as f64) {
+    if wanted.is_nan() || wanted >= MOST as f64 {
         let fits = (area / MOST as f64).sqrt() * 1.01;
         return Err(VoxelizeError::TooManyPoints {
             spacing,
