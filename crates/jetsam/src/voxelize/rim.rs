@@ -9,21 +9,22 @@
 //! exactly, with one solid angle per side of the rim and none per triangle (the observation behind the one-shot method of
 //! Martens & Bessmeltsev 2025). The sum is smooth along a row; its gradient is the Biot-Savart field of the rim, at most
 //! Σ length / (4π distance²), which tells how many cells ahead the rounding of w cannot change. Where the rim is longer
-//! than the mesh is worth (a soup), w comes from the [`WindingTree`] and the same bound from its clusters.
+//! than the mesh is worth (a soup), w comes from the [`WindingTree`], and so do the same bound and a second one, from the
+//! triangles' own fields, that is better amid many rims and away from the surface.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
 use super::raster::{Fixed, ONE};
-use super::tree::{Sample, WindingTree, segment_distance};
+use super::tree::{Bound, WindingTree, segment_distance};
 
 /// Sides of a rim that are still summed one by one.
 const SHORT: usize = 400;
-/// Clusters nearer than this many radii are opened.
-const BETA: f64 = 2.5;
+/// Clusters nearer than this many radii are opened: at first, and where that leaves a doubt.
+const BETA: [f64; 2] = [2.0, 4.0];
 /// What the tree may be wrong by at that.
-const TREE_ERROR: f64 = 0.01;
+const TREE_ERROR: [f64; 2] = [0.01, 0.001];
 
 /// A side of the rim, in lattice units, counted `weight` times.
 #[derive(Clone, Copy)]
@@ -77,53 +78,53 @@ impl Rim {
     /// At cell (i, j, k), after `crossings` signed crossings from x = -∞.
     pub fn offset(&self, cell: [u32; 3], crossings: i32) -> Offset {
         let p = cell.map(|c| i64::from(c) * ONE);
-        let (sample, error) = match &self.tree {
-            None => (self.sum(p), 1e-9),
+        let (value, error, rim, sheet) = match &self.tree {
+            None => {
+                let (value, rim) = self.sum(p);
+                (value, 1e-9, rim, Bound::NONE)
+            }
             Some(tree) => {
-                let near = tree.sample(in_cells(p), BETA);
-                let doubtful = (near.winding.abs().fract() - 0.5).abs() < 2.0 * TREE_ERROR;
-                let winding = if doubtful {
-                    self.sum(p).winding + f64::from(crossings)
+                let at = in_cells(p);
+                let doubt = |w: f64, error: f64| (w.abs().fract() - 0.5).abs() < error;
+                let (mut near, mut error) = (tree.sample(at, BETA[0]), TREE_ERROR[0]);
+                if doubt(near.winding, error) {
+                    (near, error) = (tree.sample(at, BETA[1]), TREE_ERROR[1]);
+                }
+                // On the surface itself the half-open rule decides, and only the sum knows it.
+                let value = if near.touching || doubt(near.winding, error) {
+                    self.sum(p).0
                 } else {
-                    near.winding
+                    near.winding - f64::from(crossings)
                 };
-                (
-                    Sample {
-                        winding: winding - f64::from(crossings),
-                        ..near
-                    },
-                    TREE_ERROR,
-                )
+                (value, error, near.rim, near.sheet)
             }
         };
-        let value = sample.winding;
         let margin = 0.5 - (value - value.round()).abs() - error;
-        let reach = margin / (sample.rate + margin / sample.distance);
-        Offset {
-            value,
-            ahead: if margin > 0.0 {
-                reach.min(1e6) as u32
-            } else {
-                0
-            },
-        }
+        let by_sheet = if self.tree.is_some() {
+            sheet.reach(margin, 3.0)
+        } else {
+            0.0
+        };
+        let reach = rim.reach(margin, 1.0).max(by_sheet);
+        let ahead = if margin > 0.0 {
+            reach.min(1e6) as u32
+        } else {
+            0
+        };
+        Offset { value, ahead }
     }
 
     /// The sum of the module's head, and its gradient's bound.
-    fn sum(&self, p: Fixed) -> Sample {
-        let (mut angle, mut rate, mut distance) = (0.0, 0.0, f64::INFINITY);
+    fn sum(&self, p: Fixed) -> (f64, Bound) {
+        let (mut angle, mut bound) = (0.0, Bound::NONE);
         for side in &self.sides {
-            angle += f64::from(side.weight) * strip_angle(side, p);
+            let weight = f64::from(side.weight);
+            angle += weight * strip_angle(side, p);
             let (a, b) = (relative(side.a, p), relative(side.b, p));
             let d = segment_distance(a, b);
-            rate += f64::from(side.weight.abs()) * (b - a).length() / (d * d);
-            distance = distance.min(d);
+            bound.add(weight.abs() * (b - a).length() / (d * d), d);
         }
-        Sample {
-            winding: angle / (4.0 * PI),
-            rate: rate / (4.0 * PI),
-            distance,
-        }
+        (angle / (4.0 * PI), bound)
     }
 }
 

@@ -108,11 +108,12 @@ impl Eq for Crowded {}
 fn eliminate(points: Vec<DVec3>, wanted: usize, area: f64) -> Vec<DVec3> {
     // The spacing of the densest packing of so many points.
     let reach = (2.0 / 3f64.sqrt() * area / wanted as f64).sqrt();
-    let mut cells: HashMap<I64Vec3, Vec<u32>> = HashMap::new();
-    let cell = |p: DVec3| (p / reach).floor().as_i64vec3();
+    let mut filling: HashMap<I64Vec3, Vec<u32>> = HashMap::new();
+    let cell = |p: DVec3| ((p - points[0]) / reach).floor().as_i64vec3();
     for (p, i) in points.iter().zip(0..) {
-        cells.entry(cell(*p)).or_default().push(i);
+        filling.entry(cell(*p)).or_default().push(i);
     }
+    let cells = &filling;
     let crowding = |i: u32, j: u32| {
         let d = points[i as usize].distance(points[j as usize]) / reach;
         if d < 1.0 && i != j {
@@ -124,13 +125,11 @@ fn eliminate(points: Vec<DVec3>, wanted: usize, area: f64) -> Vec<DVec3> {
     let neighbours = |i: u32| {
         let home = cell(points[i as usize]);
         let offsets = (0..27).map(|n| I64Vec3::new(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1));
-        offsets
-            .filter_map(|o| cells.get(&(home + o)).cloned())
-            .flatten()
-            .collect::<Vec<u32>>()
+        let near = offsets.filter_map(move |o| cells.get(&home.saturating_add(o)));
+        near.flatten().copied()
     };
     let mut weight: Vec<f64> = (0..points.len() as u32)
-        .map(|i| neighbours(i).into_iter().map(|j| crowding(i, j)).sum())
+        .map(|i| neighbours(i).map(|j| crowding(i, j)).sum())
         .collect();
     let mut queue: BinaryHeap<Crowded> = weight
         .iter()
@@ -155,7 +154,7 @@ fn eliminate(points: Vec<DVec3>, wanted: usize, area: f64) -> Vec<DVec3> {
         }
         gone[i as usize] = true;
         left -= 1;
-        for j in neighbours(i).into_iter().filter(|j| !gone[*j as usize]) {
+        for j in neighbours(i).filter(|j| !gone[*j as usize]) {
             weight[j as usize] -= crowding(i, j);
         }
     }

@@ -14,9 +14,19 @@ use crate::mesh::{Mesh, outer};
 /// Solid angle, in steradians, of a triangle seen from the origin (Van Oosterom & Strackee 1983): positive where its
 /// corners run counter-clockwise seen from the far side.
 pub fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    let [numerator, denominator, _] = half_tangent(a, b, c);
+    2.0 * numerator.atan2(denominator)
+}
+
+/// Numerator and denominator of the tangent of half the solid angle, and their scale.
+fn half_tangent(a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
-    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    2.0 * a.dot(b.cross(c)).atan2(denominator)
+    let scale = la * lb * lc;
+    [
+        a.dot(b.cross(c)),
+        scale + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb,
+        scale,
+    ]
 }
 
 /// The generalised winding number of the mesh at `p`, triangle by triangle.
@@ -47,6 +57,7 @@ struct Node {
     /// For each component of the normal, the integral of it times d dᵀ, with d from the centre.
     second: [DMat3; 3],
     rim: f64,
+    area: f64,
     first: u32,
     count: u32,
     /// Index of the other child; one follows its parent. Zero: a leaf.
@@ -72,13 +83,43 @@ impl Node {
     }
 }
 
-/// A winding number and how fast it can change.
+/// A bound of a gradient that grows where something comes nearer.
+#[derive(Clone, Copy)]
+pub(crate) struct Bound {
+    /// At the point itself.
+    pub rate: f64,
+    /// How near that something is, or nearer.
+    pub distance: f64,
+}
+
+impl Bound {
+    pub const NONE: Bound = Bound {
+        rate: 0.0,
+        distance: f64::INFINITY,
+    };
+
+    /// Adds a source whose field is `rate` here.
+    pub fn add(&mut self, rate: f64, distance: f64) {
+        self.rate += rate / (4.0 * PI);
+        self.distance = self.distance.min(distance);
+    }
+
+    /// How far the value can be followed before it has changed by `margin`, for a gradient that grows as the
+    /// `power` of the distance: s · rate / (1 - s/d)^power <= margin holds for this s.
+    pub fn reach(&self, margin: f64, power: f64) -> f64 {
+        margin / (self.rate + power * margin / self.distance)
+    }
+}
+
+/// A winding number and how fast it can change, away from the surface.
 pub(crate) struct Sample {
     pub winding: f64,
-    /// Bound of its gradient at the point itself.
-    pub rate: f64,
-    /// Distance to the nearest free rim, or less.
-    pub distance: f64,
+    /// As the field of the free rims: Σ length / distance².
+    pub rim: Bound,
+    /// As the field of the triangles: Σ 2 area / distance³. Not even this holds beyond a triangle.
+    pub sheet: Bound,
+    /// Whether the point lies on a triangle, or next to nothing from it.
+    pub touching: bool,
 }
 
 const LEAF: usize = 8;
@@ -115,7 +156,8 @@ impl WindingTree {
     }
 
     pub(crate) fn sample(&self, p: DVec3, beta: f64) -> Sample {
-        let (mut angle, mut rate, mut nearest) = (0.0, 0.0, f64::INFINITY);
+        let (mut angle, mut rim, mut sheet) = (0.0, Bound::NONE, Bound::NONE);
+        let mut touching = false;
         let mut at = 0;
         let mut pending = [0u32; 64];
         let mut depth = 0;
@@ -125,9 +167,10 @@ impl WindingTree {
             if r2 > (beta * node.radius).powi(2) {
                 let r = r2.sqrt();
                 angle += node.far(d, r);
+                let near = r - node.radius;
+                sheet.add(2.0 * node.area / near.powi(3), near);
                 if node.rim > 0.0 {
-                    rate += node.rim / (r - node.radius).powi(2);
-                    nearest = nearest.min(r - node.radius);
+                    rim.add(node.rim / (near * near), near);
                 }
             } else if node.other > 0 {
                 pending[depth] = node.other;
@@ -135,15 +178,18 @@ impl WindingTree {
                 at += 1;
                 continue;
             } else {
+                let near = (r2.sqrt() - node.radius).max(0.0);
+                sheet.add(2.0 * node.area / near.powi(3), near);
                 for i in node.first as usize..(node.first + node.count) as usize {
                     let [a, b, c] = self.triangles[i].map(|v| v - p);
-                    angle += solid_angle(a, b, c);
+                    let [numerator, denominator, scale] = half_tangent(a, b, c);
+                    angle += 2.0 * numerator.atan2(denominator);
+                    touching |= numerator.abs() <= 1e-6 * scale && denominator <= 1e-6 * scale;
                     if self.rims[i] > 0.0 {
                         let d = segment_distance(a, b)
                             .min(segment_distance(b, c))
                             .min(segment_distance(c, a));
-                        rate += self.rims[i] / (d * d);
-                        nearest = nearest.min(d);
+                        rim.add(self.rims[i] / (d * d), d);
                     }
                 }
             }
@@ -153,10 +199,12 @@ impl WindingTree {
             depth -= 1;
             at = pending[depth] as usize;
         }
+        let winding = angle / (4.0 * PI);
         Sample {
-            winding: angle / (4.0 * PI),
-            rate: rate / (4.0 * PI),
-            distance: nearest,
+            winding,
+            rim,
+            sheet,
+            touching,
         }
     }
 }
@@ -207,6 +255,7 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
         normal,
         moment,
         rim,
+        area,
         first,
         count: items.len() as u32,
         second,
