@@ -6,6 +6,7 @@
 //! Called by the scene (bodies, fluids and statics of shape `mesh`) and by [`crate::voxelize`].
 
 mod error;
+mod gltf;
 mod load;
 mod mass;
 mod shapes;
