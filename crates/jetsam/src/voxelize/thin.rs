@@ -46,10 +46,11 @@ pub(super) fn hollow(solid: &mut BitGrid, thickness: f64) {
     if radius >= most {
         return;
     }
-    let whole = radius.floor() as i32;
+    // One row beyond the grid stands for all rows beyond it.
+    let [_, rows, slices] = solid.dims().map(|n| n.min(radius as u32) as i32);
     let mut reach = Vec::new();
-    for dk in -whole..=whole {
-        for dj in -whole..=whole {
+    for dk in -slices..=slices {
+        for dj in -rows..=rows {
             let left = radius * radius - f64::from(dj * dj + dk * dk);
             if left >= 0.0 {
                 reach.push((dj, dk, left.sqrt() as u32));
