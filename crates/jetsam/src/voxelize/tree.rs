@@ -41,8 +41,6 @@ pub fn winding_number(mesh: &Mesh, p: DVec3) -> f64 {
 /// A hierarchy of clusters of triangles.
 pub struct WindingTree {
     triangles: Vec<[DVec3; 3]>,
-    /// Length of free rim each triangle answers for; empty when nobody asked.
-    rims: Vec<f64>,
     nodes: Vec<Node>,
 }
 
@@ -56,7 +54,6 @@ struct Node {
     moment: DMat3,
     /// For each component of the normal, the integral of it times d dᵀ, with d from the centre.
     second: [DMat3; 3],
-    rim: f64,
     area: f64,
     first: u32,
     count: u32,
@@ -114,8 +111,6 @@ impl Bound {
 /// A winding number and how fast it can change, away from the surface.
 pub(crate) struct Sample {
     pub winding: f64,
-    /// As the field of the free rims: Σ length / distance².
-    pub rim: Bound,
     /// As the field of the triangles: Σ 2 area / distance³. Not even this holds beyond a triangle.
     pub sheet: Bound,
     /// Whether the point lies on a triangle, or next to nothing from it.
@@ -127,26 +122,15 @@ const LEAF: usize = 8;
 impl WindingTree {
     /// A tree over the triangles of a mesh, O(n log n).
     pub fn new(mesh: &Mesh) -> WindingTree {
-        let triangles: Vec<_> = mesh
-            .triangles
-            .iter()
-            .map(|t| (mesh.corners(*t), 0.0))
-            .collect();
-        WindingTree::of(triangles)
+        WindingTree::of(mesh.triangles.iter().map(|t| mesh.corners(*t)).collect())
     }
 
-    /// A tree over triangles, each with the length of free rim it answers for.
-    pub(crate) fn of(mut items: Vec<([DVec3; 3], f64)>) -> WindingTree {
-        let mut nodes = Vec::with_capacity(items.len() / 2);
-        if !items.is_empty() {
-            build(&mut items, 0, &mut nodes);
+    pub(crate) fn of(mut triangles: Vec<[DVec3; 3]>) -> WindingTree {
+        let mut nodes = Vec::with_capacity(triangles.len() / 2);
+        if !triangles.is_empty() {
+            build(&mut triangles, 0, &mut nodes);
         }
-        let (triangles, rims) = items.into_iter().unzip();
-        WindingTree {
-            triangles,
-            rims,
-            nodes,
-        }
+        WindingTree { triangles, nodes }
     }
 
     /// The winding number at `p`. Clusters farther than `beta` of their radii are expanded; `beta` = 2 is right to
@@ -156,7 +140,7 @@ impl WindingTree {
     }
 
     pub(crate) fn sample(&self, p: DVec3, beta: f64) -> Sample {
-        let (mut angle, mut rim, mut sheet) = (0.0, Bound::NONE, Bound::NONE);
+        let (mut angle, mut sheet) = (0.0, Bound::NONE);
         let mut touching = false;
         let mut at = 0;
         let mut pending = [0u32; 64];
@@ -169,9 +153,6 @@ impl WindingTree {
                 angle += node.far(d, r);
                 let near = r - node.radius;
                 sheet.add(2.0 * node.area / near.powi(3), near);
-                if node.rim > 0.0 {
-                    rim.add(node.rim / (near * near), near);
-                }
             } else if node.other > 0 {
                 pending[depth] = node.other;
                 depth += 1;
@@ -185,12 +166,6 @@ impl WindingTree {
                     let [numerator, denominator, scale] = half_tangent(a, b, c);
                     angle += 2.0 * numerator.atan2(denominator);
                     touching |= numerator.abs() <= 1e-6 * scale && denominator <= 1e-6 * scale;
-                    if self.rims[i] > 0.0 {
-                        let d = segment_distance(a, b)
-                            .min(segment_distance(b, c))
-                            .min(segment_distance(c, a));
-                        rim.add(self.rims[i] / (d * d), d);
-                    }
                 }
             }
             if depth == 0 {
@@ -202,7 +177,6 @@ impl WindingTree {
         let winding = angle / (4.0 * PI);
         Sample {
             winding,
-            rim,
             sheet,
             touching,
         }
@@ -216,8 +190,8 @@ pub(crate) fn segment_distance(a: DVec3, b: DVec3) -> f64 {
     (a + ab * along).length()
 }
 
-fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
-    let (mut area, mut weighted, mut normal, mut rim) = (0.0, DVec3::ZERO, DVec3::ZERO, 0.0);
+fn build(items: &mut [[DVec3; 3]], first: u32, nodes: &mut Vec<Node>) {
+    let (mut area, mut weighted, mut normal) = (0.0, DVec3::ZERO, DVec3::ZERO);
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let parts = |t: &[DVec3; 3]| {
         (
@@ -225,12 +199,11 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
             (t[0] + t[1] + t[2]) / 3.0,
         )
     };
-    for (t, r) in items.iter() {
+    for t in items.iter() {
         let (n, centroid) = parts(t);
         area += n.length();
         weighted += centroid * n.length();
         normal += n;
-        rim += r;
         (lo, hi) = (lo.min(centroid), hi.max(centroid));
     }
     let center = if area > 0.0 {
@@ -239,7 +212,7 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
         0.5 * (lo + hi)
     };
     let (mut radius, mut moment, mut second) = (0.0f64, DMat3::ZERO, [DMat3::ZERO; 3]);
-    for (t, _) in items.iter() {
+    for t in items.iter() {
         let (n, centroid) = parts(t);
         radius = t.iter().fold(radius, |r, v| r.max(v.distance(center)));
         moment += outer(n, centroid - center);
@@ -254,7 +227,6 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
         radius,
         normal,
         moment,
-        rim,
         area,
         first,
         count: items.len() as u32,
@@ -265,7 +237,7 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
         let axis = (hi - lo).max_position();
         let middle = items.len() / 2;
         let key = |t: &[DVec3; 3]| t[0][axis] + t[1][axis] + t[2][axis];
-        items.sort_by(|a, b| key(&a.0).total_cmp(&key(&b.0)));
+        items.sort_by(|a, b| key(a).total_cmp(&key(b)));
         let (left, right) = items.split_at_mut(middle);
         build(left, first, nodes);
         nodes[at].other = nodes.len() as u32;
