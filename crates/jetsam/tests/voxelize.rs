@@ -1,6 +1,6 @@
 //! The voxelizer against closed forms: volumes, winding numbers and counts that follow from geometry alone.
 //!
-//! The numbering E1 to E13 and B4 is that of the validation suite in docs/validation.md.
+//! The numbers E1 to E13 and B4 are those of the project's validation suite.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -63,8 +63,8 @@ pub struct VoxelizeOptions {
     pub thin: bool,
     /// Keep only a shell of this thickness under the surface, in mesh units. Default: the whole solid.
     pub shell: Option<f64>,
-    /// The largest number of cells a grid may have. At most two grids (two bits a cell) are held. Default: 2^33, one
-    /// gibibyte a grid.
+    /// The largest number of cells a grid may have. One grid of one bit a cell (rows rounded up to 64) is held, two
+    /// more with `shell`, three more with `thin`. Default: 2^33, one gibibyte a grid.
     pub max_cells: u64,
 }
 
