@@ -315,3 +315,28 @@ fn broken_bytes_are_errors() {
         &glb(&mesh, r#"[{"mesh":0,"children":[1]},{"children":[0]}]"#),
     );
 }
+
+#[test]
+fn what_fuzzing_found_in_glb() {
+    let good = glb(&cuboid(), r#"[{"mesh":0}]"#);
+    is_the_box(&Mesh::from_bytes(MeshFormat::Gltf, &good).expect("a good file"));
+    // A header whose length is shorter than the header, and a version from nowhere.
+    for (at, value) in [(8, 4u32), (4, 1), (12, u32::MAX), (16, 0)] {
+        let mut bytes = good.clone();
+        bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        let read = Mesh::from_bytes(MeshFormat::Gltf, &bytes);
+        assert!(read.is_err() || at == 8, "word {at}");
+    }
+    // Accessors, views, meshes and nodes that are not there. The key is misspelt so that the list is empty.
+    for key in ["accessors", "bufferViews", "buffers", "meshes", "scenes"] {
+        let from = format!("\"{key}\"").into_bytes();
+        let at = good
+            .windows(from.len())
+            .position(|w| w == from)
+            .expect("the key");
+        let mut bytes = good.clone();
+        bytes[at + 1] = b'#';
+        fault(MeshFormat::Gltf, &bytes);
+    }
+    fault(MeshFormat::Gltf, &glb(&cuboid(), r#"[{"children":[7]}]"#));
+}

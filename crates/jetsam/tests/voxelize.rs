@@ -1181,6 +1181,24 @@ fn shells_are_hollow() {
 }
 
 #[test]
+fn what_fuzzing_found_in_shells_and_samples() {
+    // A sliver far longer than its area's root: sample points far apart in units of their spacing.
+    let sliver = Mesh {
+        vertices: vec![DVec3::ZERO, DVec3::X * 1e9, DVec3::new(1e9, 1e-30, 0.0)],
+        triangles: vec![[0, 1, 2]],
+    };
+    assert_eq!(sample_surface(&sliver, 1e8, 1).expect("a point").len(), 1);
+    // A shell as thick as the grid is long, on a needle of a body: no list of offsets of that size, no loop over it.
+    let needle = Mesh::cuboid(DVec3::ZERO, DVec3::new(1.0, 1e-4, 1e-4));
+    let options = VoxelizeOptions {
+        resolution: Resolution::Across(30_000),
+        shell: Some(0.5),
+        ..Default::default()
+    };
+    assert_eq!(fill(&needle, &options).len(), 30_000 * 9);
+}
+
+#[test]
 fn surface_samples_are_evenly_spread() {
     let ball = Mesh::ball(DVec3::ZERO, 1.0, 4);
     let spacing = 0.1;
