@@ -145,3 +145,15 @@ fn moved(facet: &Facet, turn: DQuat, place: DVec3) -> Facet {
         color: facet.color,
     }
 }
+
+/// A picture of a solid made of points, for `voxelize --series`.
+pub fn of_points(points: &[DVec3], spacing: f64) -> Image {
+    let radius = (0.5 * spacing) as f32;
+    let tips = points.iter().map(|p| p.as_vec3());
+    let (min, max) = tips.clone().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let (min, max) = if points.is_empty() { (Vec3::ZERO, Vec3::ONE) } else { (min - radius, max + radius) };
+    let margin = 0.05 * (max - min);
+    let camera = Camera::framing(min - margin, max + margin, Vec3::new(0.5, -1.0, 0.35), 0.5, WIDTH as f32 / HEIGHT as f32);
+    let balls: Vec<Ball> = tips.map(|center| Ball { center, radius, color: color::of_name("mesh") }).collect();
+    render(&balls, &camera, WIDTH, HEIGHT, &Options { ground: Some(min.z), ..Options::default() })
+}
