@@ -15,7 +15,7 @@ const HEIGHT: usize = 720;
 /// Radius of a ball in spacings: neighbours overlap a little, so that water looks closed.
 const RADIUS: f64 = 0.56;
 /// Speed shown white, as a fraction of the largest speed the scene can reach.
-const FAST: f64 = 0.6;
+const FAST: f64 = 0.4;
 const EDGES: [f32; 3] = [0.24, 0.26, 0.29];
 const STONE: [f32; 3] = [0.42, 0.38, 0.33];
 
