@@ -71,7 +71,7 @@ pub struct Run {
     #[arg(long, value_enum, default_value_t)]
     pub backend: Backend,
     /// Simulated seconds; by default the scene's own length.
-    #[arg(long, conflicts_with = "frames", value_parser = not_negative)]
+    #[arg(long, conflicts_with = "frames", value_parser = not_negative, allow_negative_numbers = true)]
     pub seconds: Option<f64>,
     /// Frames after frame 0, which is the beginning.
     #[arg(long)]
@@ -134,7 +134,7 @@ pub struct Voxelize {
     /// Mesh: OBJ, STL, PLY, glTF or GLB.
     pub mesh: PathBuf,
     /// Distance between neighbouring particles, in mesh units.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub spacing: Option<f64>,
     /// Particles across the longest side.
     #[arg(long)]
@@ -202,7 +202,11 @@ pub struct Scenes {
 
 fn not_negative(text: &str) -> Result<f64, String> {
     let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    if number >= 0.0 && number.is_finite() { Ok(number) } else { Err("must be finite and not negative".into()) }
+    if number >= 0.0 && number.is_finite() {
+        Ok(number)
+    } else {
+        Err("must be finite and not negative".into())
+    }
 }
 
 fn rule(text: &str) -> Result<Rule, String> {
@@ -214,7 +218,11 @@ fn rule(text: &str) -> Result<Rule, String> {
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let all: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
+    let all: Result<Vec<f64>, _> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f64>())
+        .collect();
     let all = all.map_err(|_| format!("{N} numbers separated by commas are needed"))?;
-    all.try_into().map_err(|_| format!("{N} numbers separated by commas are needed"))
+    all.try_into()
+        .map_err(|_| format!("{N} numbers separated by commas are needed"))
 }

@@ -10,6 +10,8 @@ use jetsam::{Scene, World, state_hash};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
+const HEADER: &str = "scene            particles  ms/step  Mparticle-steps/s  real-time  density err  peak MB  state hash";
+
 /// What is said of a case.
 #[derive(Serialize)]
 struct Case {
@@ -45,21 +47,34 @@ pub fn bench(args: &args::Bench) -> miette::Result<Outcome> {
     }
     set_threads(args.threads)?;
     let mut finite = true;
-    if !args.json {
-        print("scene            particles  ms/step  Mparticle-steps/s  real-time  density err  peak MB  state hash");
-    }
+    let mut cases = 0;
     for name in names {
         let scene = Scene::open(name, &args.set).map_err(|e| *e)?;
         let sizes = match args.particles.as_slice() {
             [] => vec![scene.clone()],
-            wanted => wanted.iter().map(|&n| sized(&scene, n)).collect::<miette::Result<_>>()?,
+            wanted => wanted
+                .iter()
+                .map(|&n| sized(&scene, n))
+                .collect::<miette::Result<_>>()?,
         };
         for scene in sizes {
             let case = measure(name, &scene, args.steps, &mut finite)?;
-            if args.json { print_json(&case) } else { print(&line(&case)) }
+            if cases == 0 && !args.json {
+                print(HEADER);
+            }
+            cases += 1;
+            if args.json {
+                print_json(&case)
+            } else {
+                print(&line(&case))
+            }
         }
     }
-    Ok(if finite { Outcome::Fine } else { Outcome::WentWrong })
+    Ok(if finite {
+        Outcome::Fine
+    } else {
+        Outcome::WentWrong
+    })
 }
 
 /// The scene with a spacing that gives about so many fluid particles (bodies' where there is no fluid).
@@ -132,7 +147,11 @@ fn line(c: &Case) -> String {
 /// What the processor calls itself, where the system says so; else its architecture.
 fn device() -> String {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = cpuinfo.lines().find_map(|l| l.strip_prefix("model name")?.split_once(": "));
-    let named = model.map(|(_, name)| name.trim().to_owned()).or_else(|| std::env::var("PROCESSOR_IDENTIFIER").ok());
+    let model = cpuinfo
+        .lines()
+        .find_map(|l| l.strip_prefix("model name")?.split_once(": "));
+    let named = model
+        .map(|(_, name)| name.trim().to_owned())
+        .or_else(|| std::env::var("PROCESSOR_IDENTIFIER").ok());
     named.unwrap_or_else(|| std::env::consts::ARCH.into())
 }

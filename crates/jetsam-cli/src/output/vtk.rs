@@ -6,7 +6,10 @@ use std::io::{self, Write};
 /// The particles of a frame.
 pub fn write_particles(file: &mut impl Write, rows: &[Row], time: f64) -> io::Result<()> {
     let n = rows.len();
-    writeln!(file, "# vtk DataFile Version 3.0\njetsam, time {time} s\nBINARY\nDATASET POLYDATA")?;
+    writeln!(
+        file,
+        "# vtk DataFile Version 3.0\njetsam, time {time} s\nBINARY\nDATASET POLYDATA"
+    )?;
     writeln!(file, "POINTS {n} float")?;
     floats(file, rows, 0..3)?;
     writeln!(file, "\nVERTICES {n} {}", 2 * n)?;
@@ -20,9 +23,16 @@ pub fn write_particles(file: &mut impl Write, rows: &[Row], time: f64) -> io::Re
         writeln!(file, "\nSCALARS {name} float 1\nLOOKUP_TABLE default")?;
         floats(file, rows, at..at + 1)?;
     }
-    let whole: [(&str, fn(&Row) -> u32); 3] = [("kind", |r| r.kind.into()), ("owner", |r| r.owner), ("id", |r| r.id)];
+    let whole: [(&str, fn(&Row) -> u32); 3] = [
+        ("kind", |r| r.kind.into()),
+        ("owner", |r| r.owner),
+        ("id", |r| r.id),
+    ];
     for (name, value) in whole {
-        writeln!(file, "\nSCALARS {name} unsigned_int 1\nLOOKUP_TABLE default")?;
+        writeln!(
+            file,
+            "\nSCALARS {name} unsigned_int 1\nLOOKUP_TABLE default"
+        )?;
         for row in rows {
             file.write_all(&value(row).to_be_bytes())?;
         }
