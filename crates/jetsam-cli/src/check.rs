@@ -67,8 +67,8 @@ fn find(name: &str, scene: &Scene, world: &World) -> Findings {
     );
     for margin in margins.iter().filter(|m| m.value > 1.000_001 * m.limit) {
         warnings.push(format!(
-            "{} = {:.3} is above its limit {:.3}: the run will not be stable",
-            margin.name, margin.value, margin.limit
+            "{} = {:.3} is above its limit {:.3} ({})",
+            margin.name, margin.value, margin.limit, margin.meaning
         ));
     }
     Findings {

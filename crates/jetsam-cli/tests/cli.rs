@@ -619,6 +619,25 @@ fn wrong_arguments_are_status_2() {
 }
 
 #[test]
+fn a_video_without_ffmpeg_is_status_2() {
+    let dir = folder("video");
+    let file = scene(&dir, POOL);
+    let args = ["run", &file, "--save", "mp4", "--out", "o"];
+    let out = Command::new(env!("CARGO_BIN_EXE_jetsam"))
+        .args(args)
+        .current_dir(&dir)
+        .env("PATH", "")
+        .output()
+        .unwrap();
+    assert_eq!(out.status.code(), Some(2));
+    assert!(
+        text(&out.stderr).contains("install ffmpeg"),
+        "{}",
+        text(&out.stderr)
+    );
+}
+
+#[test]
 fn fluid_gives_way_to_bodies_and_says_so() {
     let dir = folder("carve");
     let file = scene(&dir, &pool_with("0.25, 0.25, 0.5", "0.25, 0.25, 0.12"));

@@ -15,7 +15,9 @@ const HEIGHT: usize = 720;
 /// Radius of a ball in spacings: neighbours overlap a little, so that water looks closed.
 const RADIUS: f64 = 0.56;
 /// Speed shown white, as a fraction of the largest speed the scene can reach.
-const FAST: f64 = 0.4;
+const FAST: f64 = 0.8;
+/// Below 1: slow water is told apart better than fast water.
+const SLOW: f32 = 0.7;
 const EDGES: [f32; 3] = [0.24, 0.26, 0.29];
 const STONE: [f32; 3] = [0.42, 0.38, 0.33];
 
@@ -133,7 +135,7 @@ impl Painter {
             balls.push(Ball {
                 center: r.x.into(),
                 radius,
-                color: color::water(speed / fast),
+                color: color::water((speed / fast).powf(SLOW)),
             });
         }
         for i in p.segment(Kind::Rigid).chain(p.segment(Kind::Static)) {

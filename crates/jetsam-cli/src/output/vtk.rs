@@ -23,18 +23,14 @@ pub fn write_particles(file: &mut impl Write, rows: &[Row], time: f64) -> io::Re
         writeln!(file, "\nSCALARS {name} float 1\nLOOKUP_TABLE default")?;
         floats(file, rows, at..at + 1)?;
     }
-    let whole: [(&str, fn(&Row) -> u32); 3] = [
-        ("kind", |r| r.kind.into()),
-        ("owner", |r| r.owner),
-        ("id", |r| r.id),
-    ];
-    for (name, value) in whole {
+    for (name, which) in [("kind", 0), ("owner", 1), ("id", 2)] {
         writeln!(
             file,
             "\nSCALARS {name} unsigned_int 1\nLOOKUP_TABLE default"
         )?;
         for row in rows {
-            file.write_all(&value(row).to_be_bytes())?;
+            let value = [row.kind.into(), row.owner, row.id][which];
+            file.write_all(&value.to_be_bytes())?;
         }
     }
     writeln!(file)
