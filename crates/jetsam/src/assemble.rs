@@ -6,9 +6,8 @@
 
 use crate::error::Result;
 use crate::interact::cells::Grid;
-use crate::laws::kernel::Kernel;
 use crate::mesh::Mesh;
-use crate::model::{ContactModel, DtBound, FluidModel, Model};
+use crate::model::{ContactModel, DtBound, Factors, FluidModel, Model};
 use crate::random;
 use crate::scene::solid::Solid;
 use crate::scene::{Coupling, EquationOfState, Rigid, Scene, Start, Wall};
@@ -46,9 +45,7 @@ impl Scene {
         let spacing = self.resolution.spacing;
         let dimensions = self.world.dimensions;
         let support = self.solver.support * spacing;
-        let density_kernel = self.solver.kernel.density();
-        let cell = spacing.powi(dimensions as i32);
-        let volume = cell / density_kernel.lattice_sum(self.solver.support, dimensions);
+        let volume = spacing.powi(dimensions as i32);
         let layers = (self.solver.support - 1e-9).ceil().max(1.0);
         let grid = self.grid(support, layers * spacing);
         self.check_memory(&grid)?;
@@ -171,9 +168,8 @@ impl Scene {
                 body.stiffness = rigid.stiffness;
                 body.damping = rigid.damping;
                 // the particles together displace the exact volume, as far as that is a small correction
-                let cell = self.resolution.spacing.powi(self.world.dimensions as i32);
-                let share = solid.volume / solid.points.len() as f64 / cell;
-                body.particle_volume = vec![volume * share.clamp(0.8, 1.25); solid.points.len()];
+                let share = solid.volume / solid.points.len() as f64;
+                body.particle_volume = vec![share.clamp(0.8 * volume, 1.25 * volume); solid.points.len()];
                 self.check_inside(&body, grid, &key)?;
                 all.push(body);
             }
@@ -302,7 +298,8 @@ impl Scene {
             }
         }
         for body in &mut all {
-            let sum = |p: DVec3| near.sum(p, |r| kernel.value(r, support, self.world.dimensions));
+            let full = kernel.lattice_sum(self.solver.support, self.world.dimensions);
+            let sum = |p: DVec3| near.sum(p, |r| kernel.value(r, support, self.world.dimensions)) / full;
             body.particle_volume = body.points().map(|p| volume.min(1.0 / sum(p))).collect();
         }
         Ok(all)
@@ -352,7 +349,6 @@ impl Scene {
     ) -> Result<(Model, Vec<(DVec3, DVec3, u32)>)> {
         let gravity = DVec3::from(self.world.gravity);
         let spacing = self.resolution.spacing;
-        let cell = spacing.powi(self.world.dimensions as i32);
         let mut fluid: Vec<(DVec3, DVec3, u32)> = Vec::new();
         let (mut carved, mut outside) = (0, 0);
         for (index, f) in self.fluid.iter().enumerate() {
@@ -423,6 +419,7 @@ impl Scene {
             support,
             volume,
             kernel: self.solver.kernel,
+            factors: Factors::new(self.solver.kernel, self.solver.support, support, self.world.dimensions),
             fluids,
             contacts,
             largest_speed,
@@ -440,7 +437,7 @@ impl Scene {
             },
             warnings: Vec::new(),
         };
-        model.dt_bounds = self.dt_bounds(&model, cell);
+        model.dt_bounds = self.dt_bounds(&model);
         Ok((model, fluid))
     }
 
@@ -523,7 +520,7 @@ impl Scene {
     }
 
     /// Bounds of the time step that do not change (E29).
-    fn dt_bounds(&self, model: &Model, cell: f64) -> Vec<(DtBound, f64)> {
+    fn dt_bounds(&self, model: &Model) -> Vec<(DtBound, f64)> {
         let s = &self.solver;
         let mut bounds = Vec::new();
         let mut viscous = f64::INFINITY;
@@ -545,7 +542,6 @@ impl Scene {
                 }
             }
         }
-        let _ = cell;
         for (bound, dt) in [(DtBound::Viscosity, viscous), (DtBound::Contact, contact)] {
             if dt.is_finite() {
                 bounds.push((bound, dt));
@@ -812,10 +808,4 @@ fn available_gigabytes() -> f64 {
 fn check_available(bytes: f64) -> std::result::Result<(), (f64, f64)> {
     let have = available_gigabytes();
     if bytes / 1e9 <= 0.9 * have { Ok(()) } else { Err((bytes / 1e9, have)) }
-}
-
-/// The kernel whose lattice sum calibrates masses; for reports.
-pub fn calibration(model: &Model) -> (Kernel, f64) {
-    let kernel = model.kernel.density();
-    (kernel, kernel.lattice_sum(model.solver.support, model.dimensions))
 }

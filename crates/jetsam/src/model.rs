@@ -14,10 +14,12 @@ pub struct Model {
     pub spacing: f64,
     /// Radius of the kernel's support `H` (m).
     pub support: f64,
-    /// Rest volume of a fluid particle, `dx^d / S` (m^d): a resting lattice has density `rho_0` exactly.
+    /// Rest volume of a fluid particle, `dx^d` (m^d).
     pub volume: f64,
     /// Kernels.
     pub kernel: KernelSet,
+    /// Their factors.
+    pub factors: Factors,
     /// Fluids, in the order of the scene.
     pub fluids: Vec<FluidModel>,
     /// Contact numbers of each body, in the order of [`crate::state::Bodies`].
@@ -42,6 +44,30 @@ pub struct Model {
     pub full_support: f64,
     /// What was repaired or looks doubtful.
     pub warnings: Vec<String>,
+}
+
+/// Factors from the shapes of kernels to the kernels, calibrated on the lattice a fluid starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct Factors {
+    /// From the density kernel's `w(s)` to `W` (1/m^d): a resting lattice has density `rho_0` exactly.
+    pub w: f32,
+    /// From the force kernel's `g(s)` to `G = (1/r) dW/dr` (1/m^(d+2)): the gradient of a linear field on a lattice
+    /// is exact, and with it the Laplacian of E5.
+    pub g: f32,
+    /// From the viscosity kernel's shape to `nabla^2 W` (1/m^(d+2)), exact alike.
+    pub laplacian: f32,
+}
+
+impl Factors {
+    /// Factors for a support of `spacings` spacings, `support` metres.
+    pub fn new(kernel: KernelSet, spacings: f64, support: f64, dimensions: u32) -> Self {
+        let (density, force, d) = (kernel.density(), kernel.force(), dimensions as i32);
+        let w = density.norm(dimensions) / support.powi(d) / density.lattice_sum(spacings, dimensions);
+        let g = force.norm(dimensions) / support.powi(d + 2) / force.lattice_gradient(spacings, dimensions);
+        let laplacian = Kernel::laplacian_norm(dimensions) / support.powi(d + 2);
+        let laplacian = laplacian / Kernel::lattice_laplacian(spacings, dimensions);
+        Self { w: w as f32, g: g as f32, laplacian: laplacian as f32 }
+    }
 }
 
 /// Constants of a fluid.
@@ -112,21 +138,6 @@ impl Model {
     /// `1 / H`.
     pub fn inverse_support(&self) -> f32 {
         (1.0 / self.support) as f32
-    }
-
-    /// Factor from a kernel's shape `w(s)` to `W` (1/m^d).
-    pub fn w_factor(&self, kernel: Kernel) -> f32 {
-        (kernel.norm(self.dimensions) / self.support.powi(self.dimensions as i32)) as f32
-    }
-
-    /// Factor from a kernel's shape `g(s)` to `G = (1/r) dW/dr` (1/m^(d+2)).
-    pub fn g_factor(&self, kernel: Kernel) -> f32 {
-        (kernel.norm(self.dimensions) / self.support.powi(self.dimensions as i32 + 2)) as f32
-    }
-
-    /// Factor from the viscosity kernel's shape to `nabla^2 W` (1/m^(d+2)).
-    pub fn laplacian_factor(&self) -> f32 {
-        (Kernel::laplacian_norm(self.dimensions) / self.support.powi(self.dimensions as i32 + 2)) as f32
     }
 
     /// `0.01 h^2`, `h = H / 2`: keeps viscosities finite for particles that meet (m^2).

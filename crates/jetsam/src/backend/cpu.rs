@@ -87,7 +87,7 @@ impl Backend for Cpu {
             Stage::Density => self.density(model),
             Stage::Pressure => self.pressure(model),
             Stage::Boundary => self.boundary(model),
-            Stage::Forces => self.forces(model),
+            Stage::Forces => self.forces(model, advance),
             Stage::Bodies => self.bodies(model),
             Stage::Kick => self.kick(model, advance),
             Stage::Ledger => self.tally(model),
@@ -265,7 +265,7 @@ impl Cpu {
         }
     }
 
-    fn forces(&mut self, model: &Model) {
+    fn forces(&mut self, model: &Model, advance: Advance) {
         let p = &mut self.state.particles;
         let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
         for kind in Kind::ALL {
@@ -273,7 +273,8 @@ impl Cpu {
             let segment = first..first + p.count[kind as usize];
             let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
             let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut [[f32; 3]]| {
-                let input = forces::Input { model, records, owner, first: first + c * CHUNK, particle_mass };
+                let (first, dt) = (first + c * CHUNK, advance.dt as f32);
+                let input = forces::Input { model, records, owner, first, particle_mass, dt };
                 dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry));
             };
             if kind == Kind::Fluid && !p.carry.is_empty() {

@@ -25,6 +25,7 @@ pub fn chunk<S: Simd>(
 ) {
     let kernel = model.kernel.density();
     let inverse = model.inverse_support();
+    let limit = (model.support * model.support) as f32;
     let pull = match model.solver.pressure_force {
         PressureForce::Symmetric => model.gravity_f32(),
         PressureForce::Mueller => 0.5 * model.gravity_f32(), // its shares are half pressures
@@ -40,8 +41,8 @@ pub fn chunk<S: Simd>(
             let other = gather(simd, records, list);
             let (d, mut r_sq) = wrap_lanes(model, own.x, &other.x);
             for l in 0..LANES {
-                // padding names the particle itself
-                r_sq[l] = if list[l] as usize == first + k { f32::INFINITY } else { r_sq[l] };
+                // padding names the particle itself: it goes where W is zero
+                r_sq[l] = if list[l] as usize == first + k { limit } else { r_sq[l] };
             }
             let w = weights(kernel, inverse, &r_sq);
             let rho: Lanes = if model.fluids.len() == 1 {

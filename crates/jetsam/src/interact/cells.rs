@@ -77,16 +77,6 @@ impl Grid {
         grid
     }
 
-    /// Number of cells.
-    pub fn len(&self) -> usize {
-        self.cells.iter().map(|&c| c as usize).product()
-    }
-
-    /// Whether there is no cell (never).
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Whether any axis is periodic.
     pub fn is_periodic(&self) -> bool {
         self.period.iter().any(|&p| p > 0.0)
@@ -99,12 +89,6 @@ impl Grid {
             let c = ((x[a] - self.origin[a]) * self.inverse[a]) as i32; // saturates; NaN becomes 0
             c.clamp(0, self.cells[a] - 1)
         })
-    }
-
-    /// Index of a cell.
-    #[inline]
-    pub fn index(&self, c: [i32; 3]) -> usize {
-        ((c[2] * self.cells[1] + c[1]) * self.cells[0] + c[0]) as usize
     }
 
     /// Brings a position on periodic axes back into the domain.
@@ -127,29 +111,66 @@ impl Grid {
         }
     }
 
-    /// Cell of a particle, or the cell past the last with the reason in it when it has left.
+    /// Why a particle at `x` is no longer part of the simulation; 0 if it is.
     #[inline]
-    fn key(&self, x: [f32; 3]) -> u32 {
-        let gone = if !x.iter().all(|c| c.is_finite()) {
-            NONFINITE
-        } else {
-            let mut gone = 0;
-            for a in 0..3 {
-                if x[a] < self.lower[a] || x[a] > self.upper[a] {
-                    gone = gone.max(if self.walls[a] == Wall::Open { LEFT } else { LOST });
-                }
+    fn gone(&self, x: [f32; 3]) -> u32 {
+        if !x.iter().all(|c| c.is_finite()) {
+            return NONFINITE;
+        }
+        let mut gone = 0;
+        for a in 0..3 {
+            if x[a] < self.lower[a] || x[a] > self.upper[a] {
+                gone = gone.max(if self.walls[a] == Wall::Open { LEFT } else { LOST });
             }
-            gone
-        };
-        if gone == 0 { self.index(self.coordinates(x)) as u32 } else { self.len() as u32 + gone - 1 }
+        }
+        gone
+    }
+}
+
+/// The box of cells that a kind of particle occupies: cost goes with it, not with the whole domain.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Window {
+    /// First cell on each axis.
+    pub min: [i32; 3],
+    /// Number of cells on each axis.
+    pub cells: [i32; 3],
+}
+
+impl Window {
+    const EMPTY: Self = Self { min: [i32::MAX; 3], cells: [0; 3] };
+
+    fn around(c: [i32; 3]) -> Self {
+        Self { min: c, cells: [1; 3] }
+    }
+
+    fn union(self, other: Self) -> Self {
+        if self.cells[0] == 0 || other.cells[0] == 0 {
+            return if self.cells[0] == 0 { other } else { self };
+        }
+        let end = |w: &Self, a: usize| w.min[a] + w.cells[a];
+        let min = std::array::from_fn(|a| self.min[a].min(other.min[a]));
+        Self { min, cells: std::array::from_fn(|a| end(&self, a).max(end(&other, a)) - min[a]) }
+    }
+
+    fn len(&self) -> usize {
+        self.cells.iter().map(|&c| c as usize).product()
+    }
+
+    /// Index of a cell inside the window.
+    #[inline(always)]
+    fn index(&self, c: [i32; 3]) -> usize {
+        let [x, y, z] = [c[0] - self.min[0], c[1] - self.min[1], c[2] - self.min[2]];
+        ((z * self.cells[1] + y) * self.cells[0] + x) as usize
     }
 }
 
 /// Where each cell of a kind begins, and the scratch of its sort.
 #[derive(Debug, Default)]
 pub struct Cells {
-    /// `start[c]..start[c + 1]` are the places of cell `c` in the sorted order.
-    pub start: Vec<u32>,
+    /// The cells that are occupied.
+    window: Window,
+    /// `start[c]..start[c + 1]` are the places of cell `c` of the window in the sorted order.
+    start: Vec<u32>,
     /// For each place in the sorted order, where its particle stands in the input.
     pub order: Vec<AtomicU32>,
     /// Particles that passed an open side, at this sort.
@@ -167,7 +188,15 @@ impl Cells {
     /// particles are still inside.
     pub fn sort(&mut self, grid: &Grid, records: &[Record], id: Option<&[u32]>) -> usize {
         let n = records.len();
-        let bins = grid.len() + NONFINITE as usize;
+        self.window = records
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let living = chunk.iter().filter(|r| grid.gone(r.x) == 0);
+                living.fold(Window::EMPTY, |w, r| w.union(Window::around(grid.coordinates(r.x))))
+            })
+            .reduce(|| Window::EMPTY, Window::union);
+        let (window, cells) = (self.window, self.window.len());
+        let bins = cells + NONFINITE as usize;
         self.start.resize(bins + 1, 0);
         self.keys.resize(n, 0);
         if self.order.len() < n {
@@ -182,7 +211,10 @@ impl Cells {
                 count.clear();
                 count.resize(bins, 0);
                 for (key, record) in keys.iter_mut().zip(records) {
-                    *key = grid.key(record.x);
+                    *key = match grid.gone(record.x) {
+                        0 => window.index(grid.coordinates(record.x)) as u32,
+                        gone => cells as u32 + gone - 1,
+                    };
                     count[*key as usize] += 1;
                 }
             },
@@ -212,11 +244,24 @@ impl Cells {
                 by_id(&order[cell[0] as usize..cell[1] as usize], id);
             });
         }
-        let cells = grid.len();
         self.left = (self.start[cells + 1] - self.start[cells]) as usize;
         self.lost = (self.start[cells + 2] - self.start[cells + 1]) as usize;
         self.nonfinite = (self.start[cells + 3] - self.start[cells + 2]) as usize;
         n - self.left - self.lost - self.nonfinite
+    }
+}
+
+impl Cells {
+    /// Places, in the sorted order, of the particles in cells `from..=to` of the row at `y`, `z`.
+    #[inline(always)]
+    pub fn row(&self, from: i32, to: i32, y: i32, z: i32) -> std::ops::Range<usize> {
+        let w = &self.window;
+        let outside = |c: i32, a: usize| c < w.min[a] || c >= w.min[a] + w.cells[a];
+        let (from, to) = (from.max(w.min[0]), to.min(w.min[0] + w.cells[0] - 1));
+        if from > to || outside(y, 1) || outside(z, 2) {
+            return 0..0;
+        }
+        self.start[w.index([from, y, z])] as usize..self.start[w.index([to, y, z]) + 1] as usize
     }
 }
 

@@ -24,7 +24,7 @@ pub fn fluid_chunk<S: Simd>(
     density: &mut [f32],
 ) {
     let kernel = model.kernel.density();
-    let factor = model.w_factor(kernel);
+    let factor = model.factors.w;
     let volume = model.volume as f32;
     let inverse = model.inverse_support();
     let bodies: &[Kind] = match model.solver.coupling {

@@ -26,6 +26,8 @@ pub struct Input<'a> {
     pub first: usize,
     /// Mass of the particles of each body (kg), for fields.
     pub particle_mass: &'a [f32],
+    /// Length of the step (s).
+    pub dt: f32,
 }
 
 /// Forces on a chunk of particles of one kind.
@@ -141,12 +143,12 @@ fn sum_contacts(input: &Input, own: &Record, list: &[u32], constants: impl Fn(u3
         let other = &input.records[j as usize];
         let d = wrap(model, Vec3::from(other.x) - Vec3::from(own.x));
         let r = d.length();
-        if r >= diameter {
-            continue;
+        if r >= 1.5 * diameter {
+            continue; // farther than a pair parts or meets in half a step
         }
         let v = Vec3::from(other.v) - Vec3::from(own.v);
         let (k, eta) = constants(input.owner[j as usize]);
-        let f = contact::contact_force(d.to_array(), v.to_array(), r, diameter, k, eta, normal_only);
+        let f = contact::contact_force(d.to_array(), v.to_array(), r, diameter, k, eta, normal_only, input.dt);
         total += Vec3::new(f.x, f.y, f.z);
     }
     total
@@ -240,11 +242,11 @@ impl<'a> Pairs<'a> {
             model,
             own,
             kernel,
-            g_factor: model.g_factor(kernel),
-            w_factor: model.w_factor(model.kernel.density()),
+            g_factor: model.factors.g,
+            w_factor: model.factors.w,
             inverse: model.inverse_support(),
             softening: model.softening(),
-            mueller: (model.solver.viscosity == Viscosity::Mueller).then(|| model.laplacian_factor()),
+            mueller: (model.solver.viscosity == Viscosity::Mueller).then(|| model.factors.laplacian),
             force: [[0.0; LANES]; 3],
             carry: [[0.0; LANES]; 3],
         }

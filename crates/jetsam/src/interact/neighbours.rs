@@ -180,9 +180,6 @@ impl Tile {
         self.len = 0;
         let grid = around.grid;
         let cells = around.cells[kind as usize];
-        if cells.start.is_empty() {
-            return;
-        }
         let reach = |a: usize| if grid.cells[a] == 1 && grid.period[a] == 0.0 { 0..=0 } else { -1..=1 };
         for dz in reach(2) {
             let Some((z, shift_z)) = image(grid, 2, cell[2] + dz) else { continue };
@@ -238,8 +235,8 @@ impl Tile {
         shift: [f32; 3],
     ) {
         let first = around.first[kind as usize];
-        let begin = first + cells.start[around.grid.index([from, y, z])] as usize;
-        let end = first + cells.start[around.grid.index([to, y, z]) + 1] as usize;
+        let row = cells.row(from, to, y, z);
+        let (begin, end) = (first + row.start, first + row.end);
         let (at, n) = (self.len, end - begin);
         if n == 0 {
             return;

@@ -2,15 +2,25 @@
 //   d_ij = x_j - x_i,  v_ij = v_j - v_i,  r = |d_ij|
 //   diameter: contact diameter (m), k: spring (N/m), eta: dashpot (N s/m)
 //   normal_only: 0 for the seed's dashpot on the full relative velocity, 1 for its projection on d_ij
+//   dt: length of the step (s) that this force stands for
 
-// E12: force on i, zero at and beyond the contact diameter. The force on j is its exact opposite.
-fn contact_force(d_ij: vec3<f32>, v_ij: vec3<f32>, r: f32, diameter: f32, k: f32, eta: f32, normal_only: f32) -> vec3<f32> {
-  let touching = select(0.0, 1.0, r < diameter);
+// Part of the step about now in which the pair is in contact, by the overlap now and the speed along n_ij. The
+// dashpot begins and ends with a jump; weighted so, a sum over steps meets the jump to second order.
+fn contact_fraction(overlap: f32, speed: f32, dt: f32) -> f32 {
+  let travel = abs(speed) * dt;
+  let now = select(0.0, 1.0, overlap > 0.0);
+  let part = clamp(0.5 + overlap / max(travel, 1e-30), 0.0, 1.0);
+  return select(now, part, travel > 0.0);
+}
+
+// E12: force on i. The force on j is its exact opposite.
+fn contact_force(d_ij: vec3<f32>, v_ij: vec3<f32>, r: f32, diameter: f32, k: f32, eta: f32, normal_only: f32, dt: f32) -> vec3<f32> {
   let inverse_r = 1.0 / max(r, 1e-12);
-  let spring = -k * (diameter - r) * inverse_r;                                // E10
-  let along = dot(v_ij, d_ij) * inverse_r * inverse_r;
-  let dashpot = v_ij * (1.0 - normal_only) + d_ij * (along * normal_only);     // E11
-  return (d_ij * spring + dashpot * eta) * touching;
+  let overlap = diameter - r;
+  let spring = -k * max(overlap, 0.0) * inverse_r;                             // E10
+  let speed = dot(v_ij, d_ij) * inverse_r;
+  let dashpot = v_ij * (1.0 - normal_only) + d_ij * (speed * inverse_r * normal_only);   // E11
+  return d_ij * spring + dashpot * (eta * contact_fraction(overlap, speed, dt));
 }
 
 // E14: damping ratio of restitution e, from ln e.

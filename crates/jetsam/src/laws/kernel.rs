@@ -143,19 +143,40 @@ impl Kernel {
     }
 
     /// `sum W dx^d` over the infinite square or cubic lattice, the particle itself included, for a support of
-    /// `support_over_spacing` spacings: the `S` by which masses are calibrated.
+    /// `support_over_spacing` spacings: the `S` by which densities are calibrated.
     pub fn lattice_sum(self, support_over_spacing: f64, dimensions: u32) -> f64 {
-        let n = support_over_spacing.ceil() as i32;
-        let depth = if dimensions == 3 { n } else { 0 };
-        let mut sum = 0.0;
-        for i in -n..=n {
-            for j in -depth..=depth {
-                for k in -n..=n {
-                    let r = f64::from(i * i + j * j + k * k).sqrt();
-                    sum += self.value(r, support_over_spacing, dimensions);
-                }
+        over_lattice(support_over_spacing, dimensions, |r, _| self.value(r, support_over_spacing, dimensions))
+    }
+
+    /// `-sum x dW/dx dx^d` over the infinite lattice: 1 where gradients are exact, the factor by which they are
+    /// calibrated.
+    pub fn lattice_gradient(self, support_over_spacing: f64, dimensions: u32) -> f64 {
+        over_lattice(support_over_spacing, dimensions, |r, x| {
+            if r == 0.0 { 0.0 } else { -x * x / r * self.slope(r, support_over_spacing, dimensions) }
+        })
+    }
+
+    /// `sum x^2 nabla^2 W dx^d / 2` of the viscosity kernel over the infinite lattice: 1 where Laplacians are exact.
+    pub fn lattice_laplacian(support_over_spacing: f64, dimensions: u32) -> f64 {
+        let factor = Self::laplacian_norm(dimensions) / support_over_spacing.powi(dimensions as i32 + 2);
+        over_lattice(support_over_spacing, dimensions, |r, x| {
+            0.5 * x * x * factor * f64::from(Self::Viscosity.g((r / support_over_spacing) as f32))
+        })
+    }
+}
+
+/// Sum of `f(r, x)` over the points of the infinite lattice within the support, in units of the spacing.
+fn over_lattice(support: f64, dimensions: u32, f: impl Fn(f64, f64) -> f64) -> f64 {
+    let n = support.ceil() as i32;
+    let depth = if dimensions == 3 { n } else { 0 };
+    let mut sum = 0.0;
+    for i in -n..=n {
+        for j in -depth..=depth {
+            for k in -n..=n {
+                let r = f64::from(i * i + j * j + k * k).sqrt();
+                sum += f(r, f64::from(i));
             }
         }
-        sum
     }
+    sum
 }

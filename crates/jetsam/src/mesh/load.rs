@@ -2,18 +2,16 @@
 //!
 //! The readers are well-kept crates; what this file adds are limits that are checked before memory is taken, one
 //! check of indices and coordinates at the end, and errors that name the file and the remedy. Polygons are cut into
-//! fans. Materials, normals and texture coordinates are ignored; of glTF, all triangle meshes of the scene graph are
-//! joined, with their nodes' transforms.
+//! fans. Materials, normals and texture coordinates are ignored. [`super::gltf`] has a chapter of its own.
 
 use std::io::Cursor;
-use std::path::{Component, Path};
+use std::path::Path;
 
-use glam::{DMat4, DVec3, Mat4};
-use gltf::accessor::{DataType, Dimensions};
+use glam::DVec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
-use super::{Mesh, MeshError, MeshFault};
+use super::{Mesh, MeshError, MeshFault, gltf};
 
 /// The most a mesh file may hold.
 pub mod limits {
@@ -23,8 +21,6 @@ pub mod limits {
     pub const VERTICES: u64 = 100_000_000;
     /// Triangles.
     pub const TRIANGLES: u64 = 100_000_000;
-    /// Nodes of a glTF scene graph that carry a mesh.
-    pub const NODES: u64 = 100_000;
 }
 
 /// A mesh file format.
@@ -95,7 +91,7 @@ fn parse(format: MeshFormat, bytes: &[u8], folder: Option<&Path>) -> Result<Mesh
         MeshFormat::Obj => obj(bytes)?,
         MeshFormat::Stl => stl(bytes)?,
         MeshFormat::Ply => ply(bytes)?,
-        MeshFormat::Gltf => gltf(bytes, folder)?,
+        MeshFormat::Gltf => gltf::read(bytes, folder)?,
     };
     at_most("vertices", mesh.vertices.len() as u64, limits::VERTICES)?;
     at_most("triangles", mesh.triangles.len() as u64, limits::TRIANGLES)?;
@@ -103,7 +99,7 @@ fn parse(format: MeshFormat, bytes: &[u8], folder: Option<&Path>) -> Result<Mesh
     Ok(mesh)
 }
 
-fn at_most(what: &'static str, count: u64, limit: u64) -> Result<(), MeshFault> {
+pub(super) fn at_most(what: &'static str, count: u64, limit: u64) -> Result<(), MeshFault> {
     if count > limit {
         Err(MeshFault::TooLarge { what, count, limit })
     } else {
@@ -111,7 +107,7 @@ fn at_most(what: &'static str, count: u64, limit: u64) -> Result<(), MeshFault> 
     }
 }
 
-fn malformed(format: &'static str) -> impl Fn(String) -> MeshFault {
+pub(super) fn malformed(format: &'static str) -> impl Fn(String) -> MeshFault {
     move |what| MeshFault::Malformed { format, what }
 }
 
@@ -264,155 +260,4 @@ fn ply(bytes: &[u8]) -> Result<Mesh, MeshFault> {
         vertices,
         triangles: of("face").iter().flat_map(fan).collect(),
     })
-}
-
-fn gltf(bytes: &[u8], folder: Option<&Path>) -> Result<Mesh, MeshFault> {
-    let fault = malformed("glTF");
-    let file = gltf::Gltf::from_slice(bytes).map_err(|e| fault(e.to_string()))?;
-    let mut blob = file.blob;
-    let mut buffers = Vec::new();
-    for buffer in file.document.buffers() {
-        if let gltf::buffer::Source::Uri(uri) = buffer.source() {
-            check_uri(uri, folder).map_err(&fault)?;
-        }
-        let data = gltf::buffer::Data::from_source_and_blob(buffer.source(), folder, &mut blob);
-        buffers.push(data.map_err(|e| fault(e.to_string()))?.0);
-    }
-    let mut mesh = Mesh::default();
-    let (mut visited, mut stack) = (0, Vec::new());
-    let scene = file
-        .document
-        .default_scene()
-        .or_else(|| file.document.scenes().next());
-    stack.extend(
-        scene
-            .iter()
-            .flat_map(|s| s.nodes())
-            .map(|n| (n, DMat4::IDENTITY, 0)),
-    );
-    while let Some((node, parent, depth)) = stack.pop() {
-        visited += 1;
-        at_most("nodes", visited, limits::NODES)?;
-        at_most("levels of nodes", depth, 1000)?;
-        let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
-        stack.extend(node.children().map(|child| (child, world, depth + 1)));
-        for primitive in node.mesh().iter().flat_map(|m| m.primitives()) {
-            add_primitive(&mut mesh, &primitive, &buffers, world).map_err(&fault)?;
-        }
-        at_most("vertices", mesh.vertices.len() as u64, limits::VERTICES)?;
-        at_most("triangles", mesh.triangles.len() as u64, limits::TRIANGLES)?;
-    }
-    Ok(mesh)
-}
-
-/// Buffers may lie in the file itself or beside it, nowhere else.
-fn check_uri(uri: &str, folder: Option<&Path>) -> Result<(), String> {
-    let beside = || {
-        !uri.contains([':', '%'])
-            && Path::new(uri)
-                .components()
-                .all(|c| matches!(c, Component::Normal(_)))
-    };
-    match uri.starts_with("data:") || folder.is_some() && beside() {
-        true => Ok(()),
-        false => Err(format!(
-            "buffer {uri:.60?} is neither embedded nor a plain file name beside the mesh; export as GLB"
-        )),
-    }
-}
-
-fn add_primitive(
-    mesh: &mut Mesh,
-    part: &gltf::Primitive,
-    buffers: &[Vec<u8>],
-    world: DMat4,
-) -> Result<(), String> {
-    use gltf::mesh::Mode;
-    if !matches!(
-        part.mode(),
-        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
-    ) {
-        return Ok(());
-    }
-    let positions = part
-        .get(&gltf::Semantic::Positions)
-        .ok_or("a primitive has no positions")?;
-    let scalar = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-    if (positions.data_type(), positions.dimensions()) != (DataType::F32, Dimensions::Vec3) {
-        return Err("positions are not vectors of three floats".into());
-    }
-    let base = mesh.vertices.len() as u32;
-    for item in items(&positions, buffers)? {
-        let p = DVec3::new(
-            scalar(&item[0..]).into(),
-            scalar(&item[4..]).into(),
-            scalar(&item[8..]).into(),
-        );
-        mesh.vertices.push(world.transform_point3(p));
-    }
-    let count = mesh.vertices.len() as u32 - base;
-    let indices: Vec<u32> = match part.indices() {
-        None => (0..count).collect(),
-        Some(accessor) => items(&accessor, buffers)?
-            .map(|b| match accessor.data_type() {
-                DataType::U8 => u32::from(b[0]),
-                DataType::U16 => u32::from(u16::from_le_bytes([b[0], b[1]])),
-                _ => u32::from_le_bytes([b[0], b[1], b[2], b[3]]),
-            })
-            .collect(),
-    };
-    if indices.iter().any(|i| *i >= count) {
-        return Err(format!(
-            "an index is beyond the {count} vertices of its primitive"
-        ));
-    }
-    let corner = |i: usize| base + indices[i];
-    let n = indices.len();
-    match part.mode() {
-        Mode::Triangles => mesh
-            .triangles
-            .extend((0..n / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2].map(corner))),
-        Mode::TriangleFan => mesh
-            .triangles
-            .extend((2..n).map(|i| [0, i - 1, i].map(corner))),
-        _ => mesh
-            .triangles
-            .extend((2..n).map(|i| [i - 2, i - 1 + i % 2, i - i % 2].map(corner))),
-    }
-    Ok(())
-}
-
-/// The raw items of an accessor, after checking that its view and its buffer hold them.
-fn items<'a>(
-    accessor: &gltf::Accessor,
-    buffers: &'a [Vec<u8>],
-) -> Result<impl Iterator<Item = &'a [u8]> + use<'a>, String> {
-    if accessor.sparse().is_some() {
-        return Err("sparse accessors are not supported".into());
-    }
-    if !matches!(
-        accessor.data_type(),
-        DataType::U8 | DataType::U16 | DataType::U32 | DataType::F32
-    ) {
-        return Err("an accessor has an unexpected component type".into());
-    }
-    let view = accessor.view().ok_or("an accessor has no buffer view")?;
-    let (size, count) = (accessor.size(), accessor.count());
-    let stride = view.stride().unwrap_or(size);
-    let short = || String::from("a buffer is shorter than its accessors say");
-    let data = buffers.get(view.buffer().index()).ok_or_else(short)?;
-    let end = view.offset().checked_add(view.length()).ok_or_else(short)?;
-    let data = data
-        .get(view.offset()..end)
-        .and_then(|d| d.get(accessor.offset()..))
-        .ok_or_else(short)?;
-    let needed = count
-        .checked_sub(1)
-        .map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
-    match needed {
-        Some(bytes) if bytes <= data.len() && stride >= size => {
-            Ok((0..count).map(move |i| &data[i * stride..i * stride + size]))
-        }
-        _ => Err(short()),
-    }
 }

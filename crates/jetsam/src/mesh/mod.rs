@@ -1,11 +1,12 @@
 //! Triangle meshes: what the voxelizer eats.
 //!
-//! In: a file ([`Mesh::load`]), its bytes ([`Mesh::from_bytes`]) or a shape built in code ([`shapes`](Mesh::ball)).
+//! In: a file ([`Mesh::load`]), its bytes ([`Mesh::from_bytes`]) or a shape built in code ([`Mesh::ball`] and its like).
 //! Out: vertices and triangles in the file's own units, a [`MeshReport`] that says what is wrong with them
 //! ([`Mesh::report`]), and exact volume, centre of mass and inertia ([`Mesh::mass_properties`]).
 //! Called by the scene (bodies, fluids and statics of shape `mesh`) and by [`crate::voxelize`].
 
 mod error;
+mod gltf;
 mod load;
 mod mass;
 mod shapes;

@@ -1,4 +1,4 @@
-//! Meshes built in code, for scenes, tests and benches: all closed, facing outward, vertices shared.
+//! Meshes built in code, for scenes, tests and benches: facing outward, vertices shared, and closed where not said otherwise.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -157,8 +157,8 @@ impl Mesh {
         })
     }
 
-    /// A (p, q) torus knot: the curve winds `p` times about z and `q` times about the circle of radius `major`
-    /// on a torus of tube radius `major`/2·0.8; around it a tube of radius `minor`.
+    /// A (p, q) torus knot: a tube of radius `minor` about a curve that winds `p` times about z while it winds `q`
+    /// times about the circle of radius `major`, at 0.4 `major` from it. 2 · `around` · `across` triangles.
     pub fn torus_knot(p: u32, q: u32, major: f64, minor: f64, around: u32, across: u32) -> Mesh {
         let (p, q) = (f64::from(p), f64::from(q));
         let curve = |t: f64| {
@@ -175,8 +175,8 @@ impl Mesh {
         })
     }
 
-    /// The unit sphere's part below polar angle `open` (radians) is left out about +z: a ball with a hole, of
-    /// `rings` rings of `segments` quads. `open` = π/2 leaves a hemisphere.
+    /// A ball about the origin with a round hole about +z, of polar angle `open` (radians): `rings` rings of `segments`
+    /// quads. `open` = π/2 leaves a hemisphere. Not closed.
     pub fn open_ball(radius: f64, open: f64, rings: u32, segments: u32) -> Mesh {
         let (rings, n) = (rings.max(2), segments.max(3));
         let at = |r: u32, s: u32| {

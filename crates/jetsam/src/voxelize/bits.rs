@@ -111,22 +111,26 @@ impl BitGrid {
         let [nx, ny, nz] = self.dims;
         let mut out = BitGrid::new(self.dims);
         let per_row = self.row_words();
-        let ghost = vec![if beyond { !0 } else { 0 }; per_row];
         out.par_slices().for_each(|(k, slice)| {
-            let mut spread = vec![0; per_row];
             for (j, row) in slice.chunks_mut(per_row).enumerate() {
-                for &(dj, dk, m) in reach {
+                let place = |&(dj, dk, m): &(i32, i32, u32)| {
                     let (y, z) = (j as i64 + i64::from(dj), k as i64 + i64::from(dk));
                     let inside = (0..i64::from(ny)).contains(&y) && (0..i64::from(nz)).contains(&z);
-                    spread.copy_from_slice(if inside {
-                        self.row(y as u32, z as u32)
-                    } else {
-                        &ghost
-                    });
-                    spread_row(&mut spread, m, nx, beyond);
-                    row.iter_mut().zip(&spread).for_each(|(a, b)| *a |= b);
+                    inside.then_some((y as u32, z as u32, m))
+                };
+                if beyond && reach.iter().any(|r| place(r).is_none()) {
+                    set_run(row, 0, nx);
+                    continue;
                 }
-                mask_row(row, nx);
+                for (y, z, m) in reach.iter().filter_map(place) {
+                    for (from, to) in runs(self.row(y, z), nx) {
+                        set_run(row, from.saturating_sub(m), to.saturating_add(m).min(nx));
+                    }
+                    if beyond {
+                        set_run(row, 0, m.min(nx));
+                        set_run(row, nx.saturating_sub(m), nx);
+                    }
+                }
             }
         });
         out
@@ -164,23 +168,61 @@ pub(crate) fn set_run(row: &mut [u64], from: u32, to: u32) {
 
 /// Clears what lies beyond the `nx` cells of a row.
 fn mask_row(row: &mut [u64], nx: u32) {
-    if let Some(last) = row.last_mut().filter(|_| nx % 64 != 0) {
+    if let Some(last) = row.last_mut().filter(|_| !nx.is_multiple_of(64)) {
         *last &= !0 >> (64 - nx % 64);
     }
 }
 
-/// ORs a row with itself shifted by up to `m` cells both ways.
-fn spread_row(row: &mut [u64], m: u32, nx: u32, beyond: bool) {
-    for _ in 0..m {
-        if let Some(last) = row.last_mut().filter(|_| beyond && nx % 64 != 0) {
-            *last |= !0 << (nx % 64);
+/// The maximal runs of set cells of a row of `nx` cells: first (inclusive) and last (exclusive).
+fn runs(row: &[u64], nx: u32) -> impl Iterator<Item = (u32, u32)> + '_ {
+    // The first cell at or after `at` that is set, or clear.
+    let next = move |at: u32, set: bool| {
+        let word = |w: usize| if set { row[w] } else { !row[w] };
+        let mut w = (at / 64) as usize;
+        let mut here = word(w) & (!0 << (at % 64));
+        while here == 0 && w + 1 < row.len() {
+            w += 1;
+            here = word(w);
         }
-        let mut left = u64::from(beyond);
-        for w in 0..row.len() {
-            let right = row.get(w + 1).map_or(u64::from(beyond), |next| next & 1);
-            let word = row[w];
-            row[w] = word | word << 1 | left | word >> 1 | right << 63;
-            left = word >> 63;
+        (w as u32 * 64 + here.trailing_zeros()).min(nx)
+    };
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        let from = if at < nx { next(at, true) } else { nx };
+        at = if from < nx { next(from, false) } else { nx };
+        (from < nx).then_some((from, at))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dilation_reaches_as_far_as_asked() {
+        let mut grid = BitGrid::new([200, 3, 3]);
+        let seeds = [(0u32, 1u32), (63, 1), (64, 1), (130, 1), (199, 1)];
+        for (i, j) in seeds {
+            let start = grid.slice_words() + grid.row_words() * j as usize;
+            set_run(&mut grid.words[start..], i, i + 1);
         }
+        for m in [0, 1, 5, 64, 70] {
+            let wide = grid.dilated(&[(0, 0, m), (1, 0, 0)], false);
+            for i in 0..200i64 {
+                let near = |far: u32| {
+                    seeds
+                        .iter()
+                        .any(|s| (i - i64::from(s.0)).abs() <= i64::from(far))
+                };
+                assert_eq!(wide.get(i, 1, 1), near(m), "{i} within {m}");
+                assert_eq!(wide.get(i, 0, 1), near(0), "{i} in the row below");
+                assert!(!wide.get(i, 2, 1) && !wide.get(i, 1, 0));
+            }
+            let rimmed = BitGrid::new([200, 3, 3]).dilated(&[(0, 0, m)], true);
+            assert_eq!(rimmed.count(), u64::from((2 * m).min(200)) * 9);
+        }
+        let mut inverse = grid.clone();
+        inverse.invert();
+        assert_eq!(inverse.count() + grid.count(), 200 * 9);
     }
 }

@@ -14,9 +14,10 @@ use rayon::prelude::*;
 
 use super::bits::{BitGrid, set_run};
 use super::raster::{Fixed, crossings, slices};
-use super::rim::Rim;
+use super::rim::{Offset, Rim};
 
 /// A mesh in lattice units, its triangles welded, without degenerate ones, and turned right side out.
+#[derive(Default)]
 pub(crate) struct Shape {
     pub vertices: Vec<Fixed>,
     pub triangles: Vec<[u32; 3]>,
@@ -101,22 +102,24 @@ fn running_xor(mut word: u64) -> u64 {
 /// the surface goes round a cell: more than one where parts overlap.
 pub(crate) fn winding(shape: &Shape, rim: &Rim, grid: &mut BitGrid, only: Option<&[u64]>) -> i32 {
     let [nx, ny, nz] = grid.dims();
-    let (start, list) = shape.by_slice(nz);
+    let parts = [shape, &rim.caps].map(|part| (part, part.by_slice(nz)));
     let per_row = grid.row_words();
     let most = AtomicI32::new(0);
     grid.par_slices().for_each(|(k, slice)| {
-        // A crossing: row, cell, and whether the number rises there.
-        let mut events: Vec<(u32, u32, bool)> = Vec::new();
-        for &t in &list[start[k] as usize..start[k + 1] as usize] {
-            crossings(shape.corners(t), k as u32, ny, |j, i, up| {
-                events.push((j, i.clamp(0, i64::from(nx)) as u32, up));
-            });
+        let mut events = Vec::new();
+        for ((part, (start, list)), cap) in parts.iter().zip([false, true]) {
+            for &t in &list[start[k] as usize..start[k + 1] as usize] {
+                crossings(part.corners(t), k as u32, ny, |j, i, up| {
+                    let i = i.clamp(0, i64::from(nx)) as u32;
+                    events.push(Crossing { j, i, up, cap });
+                });
+            }
         }
         events.sort_unstable();
         let mut rest = &events[..];
         let mut highest = 0;
         for (j, row) in slice.chunks_mut(per_row).enumerate() {
-            let mine = rest.partition_point(|e| e.0 == j as u32);
+            let mine = rest.partition_point(|e| e.j == j as u32);
             let (here, after) = rest.split_at(mine);
             rest = after;
             if only.is_some_and(|rows| {
@@ -136,15 +139,34 @@ pub(crate) fn winding(shape: &Shape, rim: &Rim, grid: &mut BitGrid, only: Option
     most.into_inner()
 }
 
+/// Where a row passes through a triangle.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Crossing {
+    j: u32,
+    /// The first cell beyond.
+    i: u32,
+    /// Whether the winding number rises there.
+    up: bool,
+    /// Whether the triangle is a cap of the rim's.
+    cap: bool,
+}
+
+impl Crossing {
+    fn step(&self) -> i32 {
+        if self.up { 1 } else { -1 }
+    }
+}
+
 /// The winding number is whole: a cell is solid where the crossings do not add up to zero.
-fn closed_row(events: &[(u32, u32, bool)], row: &mut [u64], nx: u32) -> i32 {
+fn closed_row(events: &[Crossing], row: &mut [u64], nx: u32) -> i32 {
     let (mut number, mut from, mut highest) = (0i32, 0, 0);
-    for &(_, at, up) in events {
+    for event in events {
+        let at = event.i;
         if number != 0 {
             set_run(row, from, at);
             highest = highest.max(if at > from { number.abs() } else { 0 });
         }
-        number += if up { 1 } else { -1 };
+        number += event.step();
         from = at;
     }
     if number != 0 {
@@ -155,18 +177,22 @@ fn closed_row(events: &[(u32, u32, bool)], row: &mut [u64], nx: u32) -> i32 {
 
 /// The winding number is whole but for the rim's part, which is asked for as seldom as its bound allows.
 fn open_row(
-    events: &[(u32, u32, bool)],
+    events: &[Crossing],
     row: &mut [u64],
     nx: u32,
-    offset: impl Fn(u32, i32) -> super::rim::Offset,
+    offset: impl Fn(u32, i32) -> Offset,
 ) -> i32 {
-    let (mut number, mut next, mut at, mut highest) = (0i32, 0, 0, 0);
-    while at < nx {
-        while let Some(event) = events.get(next).filter(|e| e.1 <= at) {
-            number += if event.2 { 1 } else { -1 };
-            next += 1;
+    let (mut number, mut caps, mut next, mut at, mut highest) = (0, 0, 0, 0, 0);
+    let pass = |upto: u32, next: &mut usize, number: &mut i32, caps: &mut i32| {
+        while let Some(event) = events.get(*next).filter(|e| e.i <= upto) {
+            *number += event.step();
+            *caps += if event.cap { event.step() } else { 0 };
+            *next += 1;
         }
-        let rim = offset(at, number);
+    };
+    while at < nx {
+        pass(at, &mut next, &mut number, &mut caps);
+        let rim = offset(at, caps);
         let outside = -rim.value.round() as i32;
         if (f64::from(number) + rim.value).abs() > 0.5 + 1e-9 {
             set_run(row, at, at + 1);
@@ -175,11 +201,8 @@ fn open_row(
         let end = at.saturating_add(rim.ahead).saturating_add(1).min(nx);
         at += 1;
         while at < end {
-            while let Some(event) = events.get(next).filter(|e| e.1 <= at) {
-                number += if event.2 { 1 } else { -1 };
-                next += 1;
-            }
-            let to = events.get(next).map_or(end, |e| e.1.min(end));
+            pass(at, &mut next, &mut number, &mut caps);
+            let to = events.get(next).map_or(end, |e| e.i.min(end));
             if number != outside {
                 set_run(row, at, to);
                 highest = highest.max((number - outside).abs());

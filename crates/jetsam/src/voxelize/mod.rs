@@ -212,15 +212,8 @@ fn rim_of(shape: &Shape) -> Rim {
             weight: weight.abs(),
         }
     };
-    let sides = topology::uncancelled(&shape.triangles, shape.vertices.len())
-        .into_iter()
-        .map(side)
-        .collect();
-    Rim::new(sides, || {
-        (0..shape.triangles.len() as u32)
-            .map(|t| shape.corners(t))
-            .collect()
-    })
+    let sides = topology::uncancelled(&shape.triangles, shape.vertices.len());
+    Rim::new(sides.into_iter().map(side).collect())
 }
 
 /// Looks for the spacing that gives the wanted number of particles within 2 %. The number falls with the cube of the

@@ -63,8 +63,8 @@ pub struct VoxelizeOptions {
     pub thin: bool,
     /// Keep only a shell of this thickness under the surface, in mesh units. Default: the whole solid.
     pub shell: Option<f64>,
-    /// The largest number of cells a grid may have. At most two grids (two bits a cell) are held. Default: 2^33, one
-    /// gibibyte a grid.
+    /// The largest number of cells a grid may have. One grid of one bit a cell (rows rounded up to 64) is held, two
+    /// more with `shell`, three more with `thin`. Default: 2^33, one gibibyte a grid.
     pub max_cells: u64,
 }
 
@@ -95,10 +95,10 @@ impl VoxelizeOptions {
             _ => {}
         }
         match self.shell {
-            Some(t) if !positive(t) => return bad("shell", t.to_string()),
-            _ if !self.offset.is_finite() => return bad("offset", self.offset.to_string()),
+            Some(t) if !positive(t) => bad("shell", t.to_string()),
+            _ if !self.offset.is_finite() => bad("offset", self.offset.to_string()),
             _ if !(self.rotation.is_finite() && self.rotation.length() > 0.0) => {
-                return bad("rotation", self.rotation.to_string());
+                bad("rotation", self.rotation.to_string())
             }
             _ => Ok(()),
         }
@@ -140,6 +140,19 @@ pub enum VoxelizeError {
         /// The cells it needs.
         cells: f64,
         /// The cells allowed.
+        limit: u64,
+        /// A spacing that needs no more than that.
+        fits: f64,
+    },
+    /// A surface sample would be too large.
+    #[error("a spacing of {spacing} needs {points:.0} points, more than the {limit} allowed")]
+    #[diagnostic(code(jetsam::voxelize::memory), help("a spacing of {fits:.3e} fits"))]
+    TooManyPoints {
+        /// The spacing asked for.
+        spacing: f64,
+        /// The points it needs.
+        points: f64,
+        /// The points allowed.
         limit: u64,
         /// A spacing that needs no more than that.
         fits: f64,

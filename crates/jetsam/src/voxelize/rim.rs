@@ -8,22 +8,27 @@
 //!
 //! exactly, with one solid angle per side of the rim and none per triangle (the observation behind the one-shot method of
 //! Martens & Bessmeltsev 2025). The sum is smooth along a row; its gradient is the Biot-Savart field of the rim, at most
-//! Σ length / (4π distance²), which tells how many cells ahead the rounding of w cannot change. Where the rim is longer
-//! than the mesh is worth (a soup), w comes from the [`WindingTree`] and the same bound from its clusters.
+//! Σ length / (4π distance²), which tells how many cells ahead the rounding of w cannot change.
+//!
+//! A long rim is cut into loops, each is closed by a **cap**, a fan of triangles, and the caps are put into a
+//! [`WindingTree`]. With its caps the mesh is closed, so that w = n - (winding number of the caps), n the signed
+//! crossings of mesh and caps. Caps are small where holes are, so the tree is small, and far from holes its field is weak.
 
+use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use super::fill::Shape;
 use super::raster::{Fixed, ONE};
-use super::tree::{Sample, WindingTree, segment_distance};
+use super::tree::{Bound, WindingTree, segment_distance};
 
 /// Sides of a rim that are still summed one by one.
 const SHORT: usize = 400;
-/// Clusters nearer than this many radii are opened.
-const BETA: f64 = 2.5;
+/// Clusters nearer than this many radii are opened: at first, and where that leaves a doubt.
+const BETA: [f64; 2] = [2.0, 4.0];
 /// What the tree may be wrong by at that.
-const TREE_ERROR: f64 = 0.01;
+const TREE_ERROR: [f64; 2] = [0.01, 0.001];
 
 /// A side of the rim, in lattice units, counted `weight` times.
 #[derive(Clone, Copy)]
@@ -37,11 +42,13 @@ pub(crate) struct Side {
 pub(crate) struct Rim {
     sides: Vec<Side>,
     tree: Option<WindingTree>,
+    /// Triangles whose crossings count along with the mesh's.
+    pub caps: Shape,
 }
 
 /// What is known at one cell.
 pub(crate) struct Offset {
-    /// Winding number minus crossings on the way from x = -∞.
+    /// Winding number minus crossings, of mesh and caps, on the way from x = -∞.
     pub value: f64,
     /// The rounding stays the same for so many more cells along the row.
     pub ahead: u32,
@@ -53,20 +60,18 @@ pub(crate) fn in_cells(p: Fixed) -> DVec3 {
 }
 
 impl Rim {
-    /// Of the given sides, of a mesh of the given triangles. Neither order matters: both are sorted here, so that
-    /// sums come out the same for any order of the file.
-    pub fn new(mut sides: Vec<Side>, triangles: impl FnOnce() -> Vec<[Fixed; 3]>) -> Rim {
+    /// Of the given sides. Their order does not matter: they are sorted here, so that sums come out the same for any
+    /// order of the file.
+    pub fn new(mut sides: Vec<Side>) -> Rim {
         sides.sort_unstable_by_key(|s| (s.a, s.b, s.weight));
-        let tree = (sides.len() > SHORT).then(|| {
-            let mut canonical = triangles();
-            for t in &mut canonical {
-                let least = (0..3).min_by_key(|i| t[*i]).unwrap_or(0);
-                t.rotate_left(least);
-            }
-            canonical.sort_unstable();
-            WindingTree::of(with_rims(&canonical, &sides))
-        });
-        Rim { sides, tree }
+        let mut caps = Shape::default();
+        if sides.len() > SHORT {
+            loops(&sides).iter().for_each(|path| cap(&mut caps, path));
+        }
+        let corners = |t: u32| caps.corners(t).map(in_cells);
+        let tree = (sides.len() > SHORT)
+            .then(|| WindingTree::of((0..caps.triangles.len() as u32).map(corners).collect()));
+        Rim { sides, tree, caps }
     }
 
     /// Whether there is no rim: every winding number is whole.
@@ -74,56 +79,50 @@ impl Rim {
         self.sides.is_empty()
     }
 
-    /// At cell (i, j, k), after `crossings` signed crossings from x = -∞.
-    pub fn offset(&self, cell: [u32; 3], crossings: i32) -> Offset {
+    /// At cell (i, j, k), after `passed` signed crossings of caps from x = -∞.
+    pub fn offset(&self, cell: [u32; 3], passed: i32) -> Offset {
         let p = cell.map(|c| i64::from(c) * ONE);
-        let (sample, error) = match &self.tree {
-            None => (self.sum(p), 1e-9),
+        let (value, error, bound, power) = match &self.tree {
+            None => {
+                let (value, bound) = self.sum(p);
+                (value, 1e-9, bound, 1.0)
+            }
             Some(tree) => {
-                let near = tree.sample(in_cells(p), BETA);
-                let doubtful = (near.winding.abs().fract() - 0.5).abs() < 2.0 * TREE_ERROR;
-                let winding = if doubtful {
-                    self.sum(p).winding + f64::from(crossings)
+                let at = in_cells(p);
+                let doubt = |w: f64, error: f64| (w.abs().fract() - 0.5).abs() < error;
+                let (mut near, mut error) = (tree.sample(at, BETA[0]), TREE_ERROR[0]);
+                if doubt(near.winding, error) {
+                    (near, error) = (tree.sample(at, BETA[1]), TREE_ERROR[1]);
+                }
+                // On a cap itself the half-open rule decides, and only the sum knows it.
+                let value = if near.touching || doubt(near.winding, error) {
+                    self.sum(p).0 - f64::from(passed)
                 } else {
-                    near.winding
+                    -near.winding
                 };
-                (
-                    Sample {
-                        winding: winding - f64::from(crossings),
-                        ..near
-                    },
-                    TREE_ERROR,
-                )
+                (value, error, near.sheet, 3.0)
             }
         };
-        let value = sample.winding;
         let margin = 0.5 - (value - value.round()).abs() - error;
-        let reach = margin / (sample.rate + margin / sample.distance);
-        Offset {
-            value,
-            ahead: if margin > 0.0 {
-                reach.min(1e6) as u32
-            } else {
-                0
-            },
-        }
+        let ahead = if margin > 0.0 {
+            bound.reach(margin, power).min(1e6) as u32
+        } else {
+            0
+        };
+        Offset { value, ahead }
     }
 
     /// The sum of the module's head, and its gradient's bound.
-    fn sum(&self, p: Fixed) -> Sample {
-        let (mut angle, mut rate, mut distance) = (0.0, 0.0, f64::INFINITY);
+    fn sum(&self, p: Fixed) -> (f64, Bound) {
+        let (mut angle, mut bound) = (0.0, Bound::NONE);
         for side in &self.sides {
-            angle += f64::from(side.weight) * strip_angle(side, p);
+            let weight = f64::from(side.weight);
+            angle += weight * strip_angle(side, p);
             let (a, b) = (relative(side.a, p), relative(side.b, p));
             let d = segment_distance(a, b);
-            rate += f64::from(side.weight.abs()) * (b - a).length() / (d * d);
-            distance = distance.min(d);
+            bound.add(weight.abs() * (b - a).length() / (d * d), d);
         }
-        Sample {
-            winding: angle / (4.0 * PI),
-            rate: rate / (4.0 * PI),
-            distance,
-        }
+        (angle / (4.0 * PI), bound)
     }
 }
 
@@ -135,6 +134,16 @@ fn relative(a: Fixed, p: Fixed) -> DVec3 {
 /// [`super::raster`] decides on which side it is.
 fn strip_angle(side: &Side, p: Fixed) -> f64 {
     let (a, b) = (relative(side.a, p), relative(side.b, p));
+    // An end straight behind p: the half-open rule puts it at (-e², -e³) in y and z, and only directions are left.
+    let behind = |v: Fixed| v[1] == p[1] && v[2] == p[2] && v[0] < p[0];
+    let sign = |x: f64| f64::MIN_POSITIVE.copysign(x);
+    let or_tie = |x: f64, tie: f64| if x == 0.0 { sign(tie) } else { x };
+    match (behind(side.a), behind(side.b)) {
+        (true, true) => return 0.0,
+        (true, false) => return 2.0 * or_tie(-b.z, b.y).atan2(-b.y),
+        (false, true) => return 2.0 * or_tie(a.z, -a.y).atan2(-a.y),
+        (false, false) => {}
+    }
     let (la, lb) = (a.length(), b.length());
     let denominator = la * lb + a.dot(b) + a.x * lb + b.x * la;
     let (left, right) = (a.y * b.z, a.z * b.y);
@@ -152,24 +161,51 @@ fn strip_angle(side: &Side, p: Fixed) -> f64 {
     2.0 * numerator.atan2(denominator)
 }
 
-/// Each triangle with the length of rim among its sides.
-fn with_rims(triangles: &[[Fixed; 3]], sides: &[Side]) -> Vec<([DVec3; 3], f64)> {
-    let mut free: std::collections::HashMap<_, _> =
-        sides.iter().map(|s| ((s.a, s.b), s.weight)).collect();
-    let item = |t: &[Fixed; 3]| {
-        let mut length = 0.0;
-        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-            for (key, sign) in [((a, b), 1), ((b, a), -1)] {
-                // The whole weight goes to the first triangle that has the side; only lengths matter.
-                if let Some(weight) = free.get_mut(&key).filter(|w| **w * sign != 0) {
-                    length += f64::from(weight.abs()) * (in_cells(a) - in_cells(b)).length();
-                    *weight = 0;
+/// Cuts a rim into simple loops. As many sides begin at a corner as end there, so a walk always goes on until it
+/// meets itself; then the loop it closed is taken off.
+fn loops(sides: &[Side]) -> Vec<Vec<Fixed>> {
+    let repeated = |s: &Side| std::iter::repeat_n((s.a, s.b), s.weight.unsigned_abs() as usize);
+    let edges: Vec<(Fixed, Fixed)> = sides.iter().flat_map(repeated).collect();
+    let mut next: HashMap<Fixed, usize> = HashMap::new();
+    for (i, (a, _)) in edges.iter().enumerate() {
+        next.entry(*a).or_insert(i);
+    }
+    let mut follow = |at: Fixed| {
+        let slot = next.get_mut(&at)?;
+        let (_, end) = edges.get(*slot).filter(|e| e.0 == at)?;
+        *slot += 1;
+        Some(*end)
+    };
+    let mut found = Vec::new();
+    for &(start, _) in &edges {
+        let (mut path, mut place) = (vec![start], HashMap::from([(start, 0)]));
+        while let Some(end) = path.last().and_then(|at| follow(*at)) {
+            if let Some(&from) = place.get(&end) {
+                found.push(path[from..].to_vec());
+                for v in path.drain(from + 1..) {
+                    place.remove(&v);
                 }
+            } else {
+                place.insert(end, path.len());
+                path.push(end);
             }
         }
-        (t.map(in_cells), length)
-    };
-    triangles.iter().map(item).collect()
+    }
+    found
+}
+
+/// Adds the fan of triangles that closes a loop: its sides run against the rim, and it meets in the loop's middle.
+fn cap(caps: &mut Shape, path: &[Fixed]) {
+    let (n, first) = (path.len() as u32, caps.vertices.len() as u32);
+    let mean = |axis: usize| path.iter().map(|v| i128::from(v[axis])).sum::<i128>() / i128::from(n);
+    caps.vertices.extend_from_slice(path);
+    if n == 3 {
+        caps.triangles.push([first + 2, first + 1, first]);
+        return;
+    }
+    caps.vertices.push([0, 1, 2].map(|axis| mean(axis) as i64));
+    caps.triangles
+        .extend((0..n).map(|i| [first + (i + 1) % n, first + i, first + n]));
 }
 
 #[cfg(test)]
@@ -190,7 +226,7 @@ mod tests {
             b: b.map(|c| c * ONE),
             weight: 1,
         });
-        let rim = Rim::new(sides.to_vec(), Vec::new);
+        let rim = Rim::new(sides.to_vec());
         for cell in (0..729u32).map(|n| [n % 9, n / 9 % 9, n / 81]) {
             // A hair off the cell, as the half-open rule has it.
             let p = in_cells(cell.map(|c| i64::from(c) * ONE)) + DVec3::new(1e-5, 1e-7, 1e-9);
@@ -208,9 +244,9 @@ mod tests {
                     });
                 }
             }
-            let found = f64::from(passed) + rim.offset(cell, passed).value;
+            let found = f64::from(passed) + rim.offset(cell, 0).value;
             // On a face, edge or corner itself the number jumps: there only nearness to some side of the jump is asked.
-            let on = cell.iter().any(|c| *c == 2) && cell.iter().sum::<u32>() <= 10;
+            let on = cell.contains(&2) && cell.iter().sum::<u32>() <= 10;
             assert!(
                 (found - expected).abs() < 1e-4 || on,
                 "{cell:?}: {found} instead of {expected}"

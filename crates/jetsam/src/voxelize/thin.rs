@@ -15,42 +15,33 @@ use super::rim::in_cells;
 /// out: a body of two cells and more stays as it is, but for its sharpest corners. Where thin meets thick, two more
 /// rings of touched cells join them.
 pub(super) fn rescue(shape: &Shape, solid: &mut BitGrid) {
-    let mut touched = touched(shape, solid.dims());
-    let ring = [
-        (-1, -1),
-        (0, -1),
-        (1, -1),
-        (-1, 0),
-        (0, 0),
-        (1, 0),
-        (-1, 1),
-        (0, 1),
-        (1, 1),
-    ]
-    .map(|(j, k)| (j, k, 1));
+    let touched = touched(shape, solid.dims());
+    let ring: Vec<_> = (-1..=1)
+        .flat_map(|k| (-1..=1).map(move |j| (j, k, 1)))
+        .collect();
     let mut added = thick(solid).dilated(&ring, false);
     added.combine(&touched, |near, touched| touched & !near);
     for _ in 0..2 {
         added = added.dilated(&ring, false);
         added.combine(&touched, |a, b| a & b);
     }
-    touched = added;
-    solid.combine(&touched, |a, b| a | b);
+    solid.combine(&added, |a, b| a | b);
 }
 
 /// Keeps the solid cells whose centre lies within `thickness` cells of the surface: those with an empty cell no farther
-/// than half a cell more.
+/// than half a cell more. Cost: rows of the grid times thickness squared.
 pub(super) fn hollow(solid: &mut BitGrid, thickness: f64) {
     let radius = thickness + 0.5;
     let most = solid.dims().into_iter().max().unwrap_or(0) as f64;
     if radius >= most {
         return;
     }
-    let whole = radius.floor() as i32;
+    // One row beyond the grid stands for all rows beyond it.
+    let [_, rows, slices] = solid.dims().map(|n| n.min(radius as u32) as i32);
     let mut reach = Vec::new();
-    for dk in -whole..=whole {
-        for dj in -whole..=whole {
-            let left = radius * radius - f64::from(dj * dj + dk * dk);
+    for dk in -slices..=slices {
+        for dj in -rows..=rows {
+            let left = radius * radius - f64::from(dj).powi(2) - f64::from(dk).powi(2);
             if left >= 0.0 {
                 reach.push((dj, dk, left.sqrt() as u32));
             }
@@ -99,7 +90,7 @@ fn thick(solid: &BitGrid) -> BitGrid {
     out
 }
 
-/// All cells whose cube touches a triangle.
+/// All cells whose cube touches a triangle. Cost: the cells in the box around each triangle.
 fn touched(shape: &Shape, dims: [u32; 3]) -> BitGrid {
     let grid = BitGrid::new(dims);
     let words: Vec<AtomicU64> = grid.words().iter().map(|_| AtomicU64::new(0)).collect();

@@ -2,21 +2,31 @@
 //!
 //! w(p) is the sum of the signed solid angles of all triangles seen from p, over 4π (Jacobson, Kavan & Sorkine-Hornung
 //! 2013): 1 inside a closed surface, 0 outside, and something between near holes. [`winding_number`] sums all of them;
-//! [`WindingTree`] sums near triangles exactly and far clusters by the first two terms of their expansion (Barill,
-//! Dickson, Schmidt, Levin & Jacobson 2018).
+//! [`WindingTree`] sums near triangles exactly and far clusters by the first three terms of their expansion
+//! (Barill, Dickson, Schmidt, Levin & Jacobson 2018).
 
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, outer};
 
 /// Solid angle, in steradians, of a triangle seen from the origin (Van Oosterom & Strackee 1983): positive where its
 /// corners run counter-clockwise seen from the far side.
 pub fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    let [numerator, denominator, _] = half_tangent(a, b, c);
+    2.0 * numerator.atan2(denominator)
+}
+
+/// Numerator and denominator of the tangent of half the solid angle, and their scale.
+fn half_tangent(a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
-    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    2.0 * a.dot(b.cross(c)).atan2(denominator)
+    let scale = la * lb * lc;
+    [
+        a.dot(b.cross(c)),
+        scale + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb,
+        scale,
+    ]
 }
 
 /// The generalised winding number of the mesh at `p`, triangle by triangle.
@@ -31,8 +41,6 @@ pub fn winding_number(mesh: &Mesh, p: DVec3) -> f64 {
 /// A hierarchy of clusters of triangles.
 pub struct WindingTree {
     triangles: Vec<[DVec3; 3]>,
-    /// Length of free rim each triangle answers for; empty when nobody asked.
-    rims: Vec<f64>,
     nodes: Vec<Node>,
 }
 
@@ -44,20 +52,69 @@ struct Node {
     normal: DVec3,
     /// Sum of (area · normal)(centroid - center)ᵀ.
     moment: DMat3,
-    rim: f64,
+    /// For each component of the normal, the integral of it times d dᵀ, with d from the centre.
+    second: [DMat3; 3],
+    area: f64,
     first: u32,
     count: u32,
-    /// Index of the second child; the first follows its parent. Zero: a leaf.
-    second: u32,
+    /// Index of the other child; one follows its parent. Zero: a leaf.
+    other: u32,
 }
 
-/// A winding number and how fast it can change.
+impl Node {
+    /// The cluster's solid angle seen from -d, at distance r: the field d/r³ and its first two derivatives, against
+    /// the moments of the normals.
+    fn far(&self, d: DVec3, r: f64) -> f64 {
+        let (i2, i3) = (1.0 / (r * r), 1.0 / (r * r * r));
+        let trace = |m: &DMat3| m.x_axis.x + m.y_axis.y + m.z_axis.z;
+        let first = trace(&self.moment) - 3.0 * i2 * d.dot(self.moment * d);
+        let (mut mixed, mut full, mut traces) = (0.0, 0.0, 0.0);
+        for (i, m) in self.second.iter().enumerate() {
+            let along = *m * d;
+            mixed += along[i];
+            full += d[i] * d.dot(along);
+            traces += trace(m) * d[i];
+        }
+        let second = i2 * (7.5 * i2 * full - 1.5 * (2.0 * mixed + traces));
+        i3 * (self.normal.dot(d) + first + second)
+    }
+}
+
+/// A bound of a gradient that grows where something comes nearer.
+#[derive(Clone, Copy)]
+pub(crate) struct Bound {
+    /// At the point itself.
+    pub rate: f64,
+    /// How near that something is, or nearer.
+    pub distance: f64,
+}
+
+impl Bound {
+    pub const NONE: Bound = Bound {
+        rate: 0.0,
+        distance: f64::INFINITY,
+    };
+
+    /// Adds a source whose field is `rate` here.
+    pub fn add(&mut self, rate: f64, distance: f64) {
+        self.rate += rate / (4.0 * PI);
+        self.distance = self.distance.min(distance);
+    }
+
+    /// How far the value can be followed before it has changed by `margin`, for a gradient that grows as the
+    /// `power` of the distance: s · rate / (1 - s/d)^power <= margin holds for this s.
+    pub fn reach(&self, margin: f64, power: f64) -> f64 {
+        margin / (self.rate + power * margin / self.distance)
+    }
+}
+
+/// A winding number and how fast it can change, away from the surface.
 pub(crate) struct Sample {
     pub winding: f64,
-    /// Bound of its gradient at the point itself.
-    pub rate: f64,
-    /// Distance to the nearest free rim, or less.
-    pub distance: f64,
+    /// As the field of the triangles: Σ 2 area / distance³. Not even this holds beyond a triangle.
+    pub sheet: Bound,
+    /// Whether the point lies on a triangle, or next to nothing from it.
+    pub touching: bool,
 }
 
 const LEAF: usize = 8;
@@ -65,26 +122,15 @@ const LEAF: usize = 8;
 impl WindingTree {
     /// A tree over the triangles of a mesh, O(n log n).
     pub fn new(mesh: &Mesh) -> WindingTree {
-        let triangles: Vec<_> = mesh
-            .triangles
-            .iter()
-            .map(|t| (mesh.corners(*t), 0.0))
-            .collect();
-        WindingTree::of(triangles)
+        WindingTree::of(mesh.triangles.iter().map(|t| mesh.corners(*t)).collect())
     }
 
-    /// A tree over triangles, each with the length of free rim it answers for.
-    pub(crate) fn of(mut items: Vec<([DVec3; 3], f64)>) -> WindingTree {
-        let mut nodes = Vec::with_capacity(items.len() / 2);
-        if !items.is_empty() {
-            build(&mut items, 0, &mut nodes);
+    pub(crate) fn of(mut triangles: Vec<[DVec3; 3]>) -> WindingTree {
+        let mut nodes = Vec::with_capacity(triangles.len() / 2);
+        if !triangles.is_empty() {
+            build(&mut triangles, 0, &mut nodes);
         }
-        let (triangles, rims) = items.into_iter().unzip();
-        WindingTree {
-            triangles,
-            rims,
-            nodes,
-        }
+        WindingTree { triangles, nodes }
     }
 
     /// The winding number at `p`. Clusters farther than `beta` of their radii are expanded; `beta` = 2 is right to
@@ -94,7 +140,8 @@ impl WindingTree {
     }
 
     pub(crate) fn sample(&self, p: DVec3, beta: f64) -> Sample {
-        let (mut angle, mut rate, mut nearest) = (0.0, 0.0, f64::INFINITY);
+        let (mut angle, mut sheet) = (0.0, Bound::NONE);
+        let mut touching = false;
         let mut at = 0;
         let mut pending = [0u32; 64];
         let mut depth = 0;
@@ -103,31 +150,22 @@ impl WindingTree {
             let r2 = d.length_squared();
             if r2 > (beta * node.radius).powi(2) {
                 let r = r2.sqrt();
-                let (r3, trace) = (
-                    r2 * r,
-                    node.moment.x_axis.x + node.moment.y_axis.y + node.moment.z_axis.z,
-                );
-                angle += (node.normal.dot(d) + trace - 3.0 * d.dot(node.moment * d) / r2) / r3;
-                if node.rim > 0.0 {
-                    rate += node.rim / (r - node.radius).powi(2);
-                    nearest = nearest.min(r - node.radius);
-                }
-            } else if node.second > 0 {
-                pending[depth] = node.second;
+                angle += node.far(d, r);
+                let near = r - node.radius;
+                sheet.add(2.0 * node.area / near.powi(3), near);
+            } else if node.other > 0 {
+                pending[depth] = node.other;
                 depth += 1;
                 at += 1;
                 continue;
             } else {
+                let near = (r2.sqrt() - node.radius).max(0.0);
+                sheet.add(2.0 * node.area / near.powi(3), near);
                 for i in node.first as usize..(node.first + node.count) as usize {
                     let [a, b, c] = self.triangles[i].map(|v| v - p);
-                    angle += solid_angle(a, b, c);
-                    if self.rims[i] > 0.0 {
-                        let d = segment_distance(a, b)
-                            .min(segment_distance(b, c))
-                            .min(segment_distance(c, a));
-                        rate += self.rims[i] / (d * d);
-                        nearest = nearest.min(d);
-                    }
+                    let [numerator, denominator, scale] = half_tangent(a, b, c);
+                    angle += 2.0 * numerator.atan2(denominator);
+                    touching |= numerator.abs() <= 1e-6 * scale && denominator <= 1e-6 * scale;
                 }
             }
             if depth == 0 {
@@ -136,10 +174,11 @@ impl WindingTree {
             depth -= 1;
             at = pending[depth] as usize;
         }
+        let winding = angle / (4.0 * PI);
         Sample {
-            winding: angle / (4.0 * PI),
-            rate: rate / (4.0 * PI),
-            distance: nearest,
+            winding,
+            sheet,
+            touching,
         }
     }
 }
@@ -151,8 +190,8 @@ pub(crate) fn segment_distance(a: DVec3, b: DVec3) -> f64 {
     (a + ab * along).length()
 }
 
-fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
-    let (mut area, mut weighted, mut normal, mut rim) = (0.0, DVec3::ZERO, DVec3::ZERO, 0.0);
+fn build(items: &mut [[DVec3; 3]], first: u32, nodes: &mut Vec<Node>) {
+    let (mut area, mut weighted, mut normal) = (0.0, DVec3::ZERO, DVec3::ZERO);
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let parts = |t: &[DVec3; 3]| {
         (
@@ -160,12 +199,11 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
             (t[0] + t[1] + t[2]) / 3.0,
         )
     };
-    for (t, r) in items.iter() {
+    for t in items.iter() {
         let (n, centroid) = parts(t);
         area += n.length();
         weighted += centroid * n.length();
         normal += n;
-        rim += r;
         (lo, hi) = (lo.min(centroid), hi.max(centroid));
     }
     let center = if area > 0.0 {
@@ -173,11 +211,15 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
     } else {
         0.5 * (lo + hi)
     };
-    let (mut radius, mut moment) = (0.0f64, DMat3::ZERO);
-    for (t, _) in items.iter() {
+    let (mut radius, mut moment, mut second) = (0.0f64, DMat3::ZERO, [DMat3::ZERO; 3]);
+    for t in items.iter() {
         let (n, centroid) = parts(t);
         radius = t.iter().fold(radius, |r, v| r.max(v.distance(center)));
-        moment += crate::mesh::outer(n, centroid - center);
+        moment += outer(n, centroid - center);
+        let [a, b, c] = t.map(|v| v - center);
+        let sum = a + b + c;
+        let square = (outer(a, a) + outer(b, b) + outer(c, c) + outer(sum, sum)) * (1.0 / 12.0);
+        (0..3).for_each(|i| second[i] += square * n[i]);
     }
     let at = nodes.len();
     nodes.push(Node {
@@ -185,19 +227,20 @@ fn build(items: &mut [([DVec3; 3], f64)], first: u32, nodes: &mut Vec<Node>) {
         radius,
         normal,
         moment,
-        rim,
+        area,
         first,
         count: items.len() as u32,
-        second: 0,
+        second,
+        other: 0,
     });
     if items.len() > LEAF {
         let axis = (hi - lo).max_position();
         let middle = items.len() / 2;
         let key = |t: &[DVec3; 3]| t[0][axis] + t[1][axis] + t[2][axis];
-        items.sort_by(|a, b| key(&a.0).total_cmp(&key(&b.0)));
+        items.sort_by(|a, b| key(a).total_cmp(&key(b)));
         let (left, right) = items.split_at_mut(middle);
         build(left, first, nodes);
-        nodes[at].second = nodes.len() as u32;
+        nodes[at].other = nodes.len() as u32;
         build(right, first + middle as u32, nodes);
     }
 }

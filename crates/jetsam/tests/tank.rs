@@ -1,0 +1,115 @@
+//! A tank of water at rest: pressure, level, weight on the floor, stillness, in two and three dimensions.
+//!
+//! References: p(z) = rho_0 g (H - z); weak compressibility allows a density excess of g H / c_0^2 at the bottom, and
+//! a column shorter by g H^2 / (2 c_0^2).
+
+mod common;
+
+use common::scene;
+use jetsam::World;
+use jetsam::state::Kind;
+
+struct Tank {
+    world: World,
+    depth: f64,
+    spacing: f64,
+    area: f64,
+}
+
+const G: f64 = 9.81;
+const RHO: f64 = 1000.0;
+
+impl Tank {
+    fn new(dimensions: u32, depth: f64, width: f64, layers: f64) -> Self {
+        let spacing = depth / layers;
+        let sound = 10.0 * (G * depth).sqrt();
+        let text = format!(
+            "[world]\ndimensions = {dimensions}\n[domain]\nmin = [0, 0, 0]\nmax = [{width}, {width}, {}]\n\
+             [resolution]\nspacing = {spacing}\n[solver]\nsound_speed = {sound}\nartificial_viscosity = 0.2\nsettle = {}\n\
+             [[fluid]]\nshape = {{ box = {{ min = [0, 0, 0], max = [{width}, {width}, {depth}] }} }}\n",
+            1.4 * depth,
+            3.0 * (depth / G).sqrt()
+        );
+        let world = World::from_scene(&scene(&text)).unwrap();
+        let area = if dimensions == 2 { width } else { width * width };
+        Self { world, depth, spacing, area }
+    }
+
+    /// Heights and pressures of the fluid's particles.
+    fn profile(&self) -> Vec<(f64, f64)> {
+        let p = &self.world.state().particles;
+        let model = self.world.model();
+        let stiffness = RHO * model.sound_speed * model.sound_speed / 7.0;
+        p.segment(Kind::Fluid)
+            .map(|i| {
+                let d = f64::from(p.density[i]);
+                (f64::from(p.record[i].x[2]), (stiffness * (d.powi(7) - 1.0)).max(0.0))
+            })
+            .collect()
+    }
+
+    fn check(mut self) {
+        let scale = (G * self.depth).sqrt();
+        let end = 20.0 * (self.depth / G).sqrt();
+        // twenty times sqrt(H / g): through the last fifth, weight and pressure at the bottom are averaged
+        self.world.advance(0.8 * end, |_, _| true);
+        let (mut weight, mut bottom, mut squares, mut samples) = (0.0, 0.0, 0.0, 0.0);
+        let (depth, spacing) = (self.depth, self.spacing);
+        while self.world.time() < end {
+            self.world.step(end - self.world.time());
+            let walls = self.world.state().bodies.body.iter().find(|b| b.is_static()).unwrap();
+            weight += walls.force.z;
+            // the two lowest layers, carried down to the floor by the weight between
+            let low: Vec<f64> = self
+                .profile()
+                .into_iter()
+                .filter(|(z, _)| *z < 2.0 * spacing)
+                .map(|(z, p)| p + RHO * G * z)
+                .collect();
+            let sensor = low.iter().sum::<f64>() / low.len() as f64;
+            bottom += sensor;
+            squares += sensor * sensor;
+            samples += 1.0;
+        }
+        let ledger = self.world.ledger();
+        let full = RHO * G * depth;
+        let mean = bottom / samples;
+        let noise = (squares / samples - mean * mean).max(0.0).sqrt();
+        let profile = self.profile();
+        let bulk: Vec<f64> = profile
+            .iter()
+            .filter(|(z, _)| *z > 2.0 * spacing && *z < depth - 2.0 * spacing)
+            .map(|(z, p)| p - RHO * G * (depth - z))
+            .collect();
+        let l2 = (bulk.iter().map(|e| e * e).sum::<f64>() / bulk.len() as f64).sqrt() / full;
+        let top = profile.iter().map(|(z, _)| *z).fold(0.0, f64::max) + 0.5 * spacing;
+        let load = -weight / samples / (RHO * G * depth * self.area);
+        println!(
+            "pressure L2 {l2:.4}, bottom mean {:.4} noise {:.5}, speed {:.1e}, level {:.2} dx, weight {load:.5}",
+            mean / full,
+            noise / full,
+            ledger.speed / scale,
+            (top - depth) / spacing
+        );
+        assert!(l2 <= 0.02, "pressure in the bulk is off by {l2}");
+        assert!((mean / full - 1.0).abs() <= 0.02, "pressure at the bottom is {}", mean / full);
+        assert!(noise / full <= 0.01, "pressure at the bottom is noisy: {}", noise / full);
+        assert!(ledger.speed / scale <= 1e-3, "the water still moves: {}", ledger.speed / scale);
+        assert!((top - depth).abs() <= 0.5 * spacing, "the level is off by {} spacings", (top - depth) / spacing);
+        assert!((load - 1.0).abs() <= 0.01, "the walls carry {load} of the weight");
+        assert_eq!((ledger.lost, ledger.nonfinite), (0, 0));
+        let inside = |x: [f32; 3]| x[2] >= 0.0 && x.iter().take(1).all(|c| *c >= 0.0);
+        let p = &self.world.state().particles;
+        assert!(p.segment(Kind::Fluid).all(|i| inside(p.record[i].x)), "water is in the walls");
+    }
+}
+
+#[test]
+fn a_flat_tank_stays_at_rest() {
+    Tank::new(2, 1.0, 1.0, 40.0).check();
+}
+
+#[test]
+fn a_deep_tank_stays_at_rest() {
+    Tank::new(3, 0.4, 0.4, 16.0).check();
+}
