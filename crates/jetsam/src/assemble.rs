@@ -183,6 +183,11 @@ impl Scene {
         let turn = axis_angle(rigid.rotation);
         let Some(copies) = &rigid.copies else { return Ok(vec![(position, turn, None)]) };
         let key = format!("{key}.copies");
+        let particles = f64::from(copies.count) * solid.points.len() as f64;
+        if particles >= f64::from(i32::MAX) || check_available(particles * BYTES_PER_PARTICLE).is_err() {
+            let message = format!("`{key}`: {} copies of {} particles are too many", copies.count, solid.points.len());
+            return Err(self.error(&key, message, "ask for fewer copies, or choose a larger [resolution] spacing"));
+        }
         let (seed, stream) = (self.world.seed, index as u64);
         let turned = |n: u32| if copies.tumble { random::rotation(seed, 2 * stream, n.into()) * turn } else { turn };
         match (&copies.grid, &copies.random) {

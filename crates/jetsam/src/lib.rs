@@ -10,6 +10,7 @@ pub mod mesh;
 pub mod model;
 pub mod params;
 pub mod random;
+pub mod report;
 pub mod scene;
 pub mod stage;
 pub mod state;
@@ -17,5 +18,6 @@ pub mod voxelize;
 pub mod world;
 
 pub use error::{Error, Result};
+pub use report::{FrameStats, Recorder, Summary, state_hash};
 pub use scene::Scene;
 pub use world::{StepReport, World};

@@ -115,6 +115,9 @@ impl World {
         if dt >= longest {
             return (longest, DtBound::Frame);
         }
+        if longest == f64::INFINITY {
+            return (dt, bound);
+        }
         // whole steps: what is left is cut evenly, so that no sliver of a step remains
         (longest / (longest / dt).ceil(), bound)
     }

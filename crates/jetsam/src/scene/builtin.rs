@@ -3,6 +3,7 @@
 use super::{Scene, Source};
 use crate::error::Result;
 use crate::mesh::MeshFormat;
+use std::path::Path;
 
 /// A scene that comes with the program.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +31,28 @@ pub(crate) fn mesh(path: &str) -> Option<(MeshFormat, &'static [u8])> {
 }
 
 impl Scene {
+    /// A scene by the name of a built-in one or by the path of its file, with `key=value` overrides.
+    ///
+    /// # Errors
+    /// A name that is neither, answered with the nearest known one; else as [`Scene::load`].
+    pub fn open(name_or_path: &str, overrides: &[String]) -> Result<Self> {
+        if let Some(scene) = Self::builtin(name_or_path, overrides) {
+            return scene;
+        }
+        let path = Path::new(name_or_path);
+        let is_path = path.extension().is_some() || path.components().count() > 1 || path.is_file();
+        if is_path {
+            return Self::load(path, overrides);
+        }
+        let near = |s: &&Builtin| (strsim::jaro_winkler(name_or_path, s.name) * 1e6) as u64;
+        let nearest = SCENES.iter().max_by_key(near).filter(|s| near(s) > 700_000);
+        let help = match nearest {
+            Some(scene) => format!("did you mean `{}`? A scene file is given by its path, as in ./{name_or_path}.toml", scene.name),
+            None => "`jetsam scenes` lists the built-in scenes; a scene file is given by its path".into(),
+        };
+        Err(Source::default().error("", format!("there is no built-in scene `{name_or_path}`"), help))
+    }
+
     /// A built-in scene by name, with `key=value` overrides; `None` if there is none of that name.
     ///
     /// # Errors

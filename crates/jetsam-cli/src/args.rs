@@ -1,0 +1,228 @@
+//! What can be written on the command line: help, completions and man page derive from here.
+
+use clap::{ArgGroup, Parser, Subcommand, ValueEnum};
+use jetsam::Scene;
+use jetsam::voxelize::Rule;
+use std::path::PathBuf;
+
+/// Meshes dropped into water: a particle simulator of rigid bodies and fluids.
+///
+/// Without a command, runs the scene `monkey-splash` and writes pictures and numbers to out/monkey-splash/.
+#[derive(Parser)]
+#[command(name = "jetsam", version, max_term_width = 100)]
+pub struct Args {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Simulate a scene; write pictures and numbers.
+    Run(Run),
+    /// Read a scene and say what it amounts to: particles, time step, stability margins, warnings.
+    Check(Check),
+    /// Turn a mesh into particles and say how well they fill it.
+    Voxelize(Voxelize),
+    /// Measure the speed of scenes; one JSON object or one line a case.
+    Bench(Bench),
+    /// List the built-in scenes.
+    Scenes(Scenes),
+    /// Print the JSON schema of the scene file.
+    Schema,
+    /// Print completions for a shell.
+    Completions { shell: clap_complete::Shell },
+    /// Print the man page.
+    #[command(hide = true)]
+    Man,
+}
+
+/// Which scene, and what to change in it.
+#[derive(clap::Args, Clone, Default)]
+pub struct Input {
+    /// Name of a built-in scene (see `jetsam scenes`) or path of a scene file.
+    pub scene: String,
+    /// Override a value of the scene by its dotted path, e.g. resolution.spacing=0.02 or rigid.0.density=300.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+impl Input {
+    /// Reads the scene.
+    pub fn open(&self) -> miette::Result<Scene> {
+        Ok(Scene::open(&self.scene, &self.set).map_err(|e| *e)?)
+    }
+}
+
+/// What computes.
+#[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum Backend {
+    /// The best there is.
+    #[default]
+    Auto,
+    /// The processor.
+    Cpu,
+}
+
+#[derive(clap::Args, Clone)]
+pub struct Run {
+    #[command(flatten)]
+    pub input: Input,
+    /// What computes.
+    #[arg(long, value_enum, default_value_t)]
+    pub backend: Backend,
+    /// Simulated seconds; by default the scene's own length.
+    #[arg(long, conflicts_with = "frames", value_parser = not_negative, allow_negative_numbers = true)]
+    pub seconds: Option<f64>,
+    /// Frames after frame 0, which is the beginning.
+    #[arg(long)]
+    pub frames: Option<u64>,
+    /// Open no window.
+    #[arg(long)]
+    pub headless: bool,
+    /// Folder to write to; by default out/ and the scene's name.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// What to write besides stats.jsonl.
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["png", "csv"])]
+    pub save: Vec<Save>,
+    /// Threads to compute with; by default one a core. Results do not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// Seed of everything random in the scene.
+    #[arg(long)]
+    pub seed: Option<u32>,
+}
+
+impl Run {
+    /// What plain `jetsam` does.
+    pub fn default_scene() -> Self {
+        let name = jetsam::scene::builtin::SCENES[0].name;
+        match Args::parse_from(["jetsam", "run", name]).command {
+            Some(Command::Run(run)) => run,
+            _ => unreachable!("`run` parses to Run"),
+        }
+    }
+}
+
+/// A kind of file a run can write.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Save {
+    /// A picture a frame.
+    Png,
+    /// A video of the pictures (needs ffmpeg).
+    Mp4,
+    /// The particles of a frame, binary PLY.
+    Ply,
+    /// The particles of a frame, legacy VTK.
+    Vtk,
+    /// The bodies' motion: bodies.csv.
+    Csv,
+}
+
+#[derive(clap::Args)]
+pub struct Check {
+    #[command(flatten)]
+    pub input: Input,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(clap::Args)]
+#[command(group = ArgGroup::new("fineness").required(true).args(["spacing", "resolution", "particles"]))]
+pub struct Voxelize {
+    /// Mesh: OBJ, STL, PLY, glTF or GLB.
+    pub mesh: PathBuf,
+    /// Distance between neighbouring particles, in mesh units.
+    #[arg(long, allow_negative_numbers = true)]
+    pub spacing: Option<f64>,
+    /// Particles across the longest side.
+    #[arg(long)]
+    pub resolution: Option<u32>,
+    /// Number of particles wanted.
+    #[arg(long)]
+    pub particles: Option<u64>,
+    /// When a place is inside: where the surface is crossed an odd number of times, or where it winds around.
+    #[arg(long, value_parser = rule, default_value = "winding", value_name = "parity|winding")]
+    pub rule: Rule,
+    /// Keep parts thinner than two particles.
+    #[arg(long)]
+    pub thin: bool,
+    /// Where the mesh's origin goes.
+    #[arg(long, value_parser = numbers::<3>, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub offset: Option<[f64; 3]>,
+    /// Rotation about the mesh's origin: axis and degrees.
+    #[arg(long, value_parser = numbers::<4>, value_name = "AX,AY,AZ,DEG", allow_hyphen_values = true)]
+    pub rotate: Option<[f64; 4]>,
+    /// Write the particles to this PLY file (with --series: pictures into this folder).
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Draw this many pictures, each with twice the particles of the last.
+    #[arg(long, requires = "out", value_name = "K", value_parser = clap::value_parser!(u8).range(1..=24))]
+    pub series: Option<u8>,
+    /// Print one JSON object (with --series: one a picture).
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Bench {
+    /// Name of a built-in scene or path of a scene file; by default every built-in scene.
+    #[arg(conflicts_with = "list")]
+    pub scene: Option<String>,
+    /// List what is measured by default.
+    #[arg(long)]
+    pub list: bool,
+    /// Choose the spacing so that there are about this many fluid particles; may be repeated.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    pub particles: Vec<u64>,
+    /// What computes.
+    #[arg(long, value_enum, default_value_t)]
+    pub backend: Backend,
+    /// Steps to measure, after a fifth as many to warm up.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+    pub steps: u64,
+    /// Override a value of the scene by its dotted path.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Threads to compute with; by default one a core.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// Print one JSON object a case.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Scenes {
+    /// Print a JSON array.
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if number >= 0.0 && number.is_finite() {
+        Ok(number)
+    } else {
+        Err("must be finite and not negative".into())
+    }
+}
+
+fn rule(text: &str) -> Result<Rule, String> {
+    match text {
+        "parity" => Ok(Rule::Parity),
+        "winding" => Ok(Rule::Winding),
+        _ => Err("parity or winding".into()),
+    }
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let all: Result<Vec<f64>, _> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f64>())
+        .collect();
+    let all = all.map_err(|_| format!("{N} numbers separated by commas are needed"))?;
+    all.try_into()
+        .map_err(|_| format!("{N} numbers separated by commas are needed"))
+}

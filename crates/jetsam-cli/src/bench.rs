@@ -1,0 +1,157 @@
+//! `jetsam bench`: how fast scenes run here, with what it costs in density error.
+
+use crate::run::set_threads;
+use crate::terminal::{print, print_json, progress};
+use crate::{MEMORY, Outcome, args};
+use jetsam::report::StageMillis;
+use jetsam::scene::builtin::SCENES;
+use jetsam::state::Kind;
+use jetsam::{Scene, World, state_hash};
+use serde::Serialize;
+use std::time::{Duration, Instant};
+
+const HEADER: &str = "scene            particles  ms/step  Mparticle-steps/s  real-time  density err  peak MB  state hash";
+
+/// What is said of a case.
+#[derive(Serialize)]
+struct Case {
+    scene: String,
+    backend: &'static str,
+    device: String,
+    /// Fluid and rigid particles.
+    particles: usize,
+    /// Mean number of fluid neighbours of a fluid particle.
+    neighbours: f64,
+    steps: u64,
+    ms_per_step: f64,
+    particle_steps_per_s: f64,
+    real_time_factor: f64,
+    density_error_mean: f64,
+    /// Most memory held at once since the case began (MB).
+    peak_mb: f64,
+    threads: usize,
+    /// Milliseconds a step by stage.
+    stage_ms: StageMillis,
+    state_hash: String,
+}
+
+/// Measures scene after scene, size after size.
+pub fn bench(args: &args::Bench) -> miette::Result<Outcome> {
+    let names = match &args.scene {
+        Some(scene) => vec![scene.as_str()],
+        None => SCENES.iter().map(|s| s.name).collect(),
+    };
+    if args.list {
+        print(&names.join("\n"));
+        return Ok(Outcome::Fine);
+    }
+    set_threads(args.threads)?;
+    let mut finite = true;
+    let mut cases = 0;
+    for name in names {
+        let scene = Scene::open(name, &args.set).map_err(|e| *e)?;
+        let sizes = match args.particles.as_slice() {
+            [] => vec![scene.clone()],
+            wanted => wanted
+                .iter()
+                .map(|&n| sized(&scene, n))
+                .collect::<miette::Result<_>>()?,
+        };
+        for scene in sizes {
+            let case = measure(name, &scene, args.steps, &mut finite)?;
+            if cases == 0 && !args.json {
+                print(HEADER);
+            }
+            cases += 1;
+            if args.json {
+                print_json(&case)
+            } else {
+                print(&line(&case))
+            }
+        }
+    }
+    Ok(if finite {
+        Outcome::Fine
+    } else {
+        Outcome::WentWrong
+    })
+}
+
+/// The scene with a spacing that gives about so many fluid particles (bodies' where there is no fluid).
+fn sized(scene: &Scene, wanted: u64) -> miette::Result<Scene> {
+    let mut scene = scene.clone();
+    // once to scale, once more for the grain of the lattice
+    for _ in 0..2 {
+        let [fluid, rigid, _] = scene.assemble().map_err(|e| *e)?.state.particles.count;
+        let ratio = if fluid > 0 { fluid } else { rigid }.max(1) as f64 / wanted as f64;
+        if (ratio - 1.0).abs() < 0.02 {
+            break;
+        }
+        scene.resolution.spacing *= ratio.powf(1.0 / f64::from(scene.world.dimensions));
+    }
+    Ok(scene)
+}
+
+fn measure(name: &str, scene: &Scene, steps: u64, finite: &mut bool) -> miette::Result<Case> {
+    MEMORY.reset_peak_usage();
+    let mut world = World::from_scene(scene).map_err(|e| *e)?;
+    let bar = progress(steps + steps.div_ceil(5), name);
+    for _ in 0..steps.div_ceil(5) {
+        world.step(f64::INFINITY);
+        bar.inc(1);
+    }
+    let timers: Vec<Duration> = world.timers().map(|t| t.1).collect();
+    let (begin, start) = (world.time(), Instant::now());
+    for _ in 0..steps {
+        *finite &= world.step(f64::INFINITY).finite;
+        bar.inc(1);
+    }
+    let wall = start.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    let count = world.state().particles.count;
+    let particles = count[Kind::Fluid as usize] + count[Kind::Rigid as usize];
+    let mut stage_ms = StageMillis::since(&timers, &world);
+    stage_ms.0.iter_mut().for_each(|s| s.1 /= steps as f64);
+    Ok(Case {
+        scene: name.into(),
+        backend: world.backend(),
+        device: device(),
+        particles,
+        neighbours: world.ledger().neighbours,
+        steps,
+        ms_per_step: 1e3 * wall / steps as f64,
+        particle_steps_per_s: particles as f64 * steps as f64 / wall,
+        real_time_factor: (world.time() - begin) / wall,
+        density_error_mean: world.ledger().density_error_mean,
+        peak_mb: f64::from(MEMORY.peak_usage_as_mb()),
+        threads: rayon::current_num_threads(),
+        stage_ms,
+        state_hash: format!("{:016x}", state_hash(world.state())),
+    })
+}
+
+fn line(c: &Case) -> String {
+    format!(
+        "{:16} {:9}  {:7.2}  {:17.2}  {:9.4}  {:9.3} %  {:7.0}  {}",
+        c.scene,
+        c.particles,
+        c.ms_per_step,
+        1e-6 * c.particle_steps_per_s,
+        c.real_time_factor,
+        100.0 * c.density_error_mean,
+        c.peak_mb,
+        c.state_hash
+    )
+}
+
+/// What the processor calls itself, where the system says so; else its architecture.
+fn device() -> String {
+    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpuinfo
+        .lines()
+        .find_map(|l| l.strip_prefix("model name")?.split_once(": "));
+    let named = model
+        .map(|(_, name)| name.trim().to_owned())
+        .or_else(|| std::env::var("PROCESSOR_IDENTIFIER").ok());
+    named.unwrap_or_else(|| std::env::consts::ARCH.into())
+}

@@ -1,0 +1,95 @@
+//! What a run leaves behind: one writer a kind of file, each called once a frame.
+
+mod bodies_csv;
+mod particles;
+pub mod pictures;
+pub mod ply;
+mod stats;
+mod video;
+mod vtk;
+
+use crate::args::Save;
+use jetsam::{Error, FrameStats, Scene, World};
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+/// Something that takes note of every frame.
+trait Writer {
+    /// A frame has ended.
+    fn write(&mut self, world: &World, stats: &FrameStats) -> miette::Result<()>;
+    /// The run has ended.
+    fn finish(&mut self) -> miette::Result<()>;
+}
+
+/// All writers of a run.
+pub struct Outputs(Vec<Box<dyn Writer>>);
+
+impl Outputs {
+    /// Makes the folder and opens what was asked for in it.
+    pub fn create(
+        folder: &Path,
+        save: &[Save],
+        scene: &Scene,
+        world: &World,
+    ) -> miette::Result<Self> {
+        std::fs::create_dir_all(folder).map_err(at(folder))?;
+        let wants = |kind| save.contains(&kind);
+        let mut all: Vec<Box<dyn Writer>> = vec![Box::new(stats::Stats::create(folder)?)];
+        if wants(Save::Csv) {
+            all.push(Box::new(bodies_csv::BodiesCsv::create(folder)?));
+        }
+        if wants(Save::Png) || wants(Save::Mp4) {
+            all.push(Box::new(pictures::Pictures::create(
+                folder,
+                wants(Save::Png),
+                wants(Save::Mp4),
+                scene,
+                world,
+            )?));
+        }
+        if wants(Save::Ply) {
+            all.push(Box::new(particles::Particles::new(
+                folder,
+                "ply",
+                ply::write_particles,
+            )));
+        }
+        if wants(Save::Vtk) {
+            all.push(Box::new(particles::Particles::new(
+                folder,
+                "vtk",
+                vtk::write_particles,
+            )));
+        }
+        Ok(Self(all))
+    }
+
+    /// A frame has ended.
+    pub fn write(&mut self, world: &World, stats: &FrameStats) -> miette::Result<()> {
+        self.0.iter_mut().try_for_each(|w| w.write(world, stats))
+    }
+
+    /// The run has ended.
+    pub fn finish(&mut self) -> miette::Result<()> {
+        self.0.iter_mut().try_for_each(|w| w.finish())
+    }
+}
+
+/// Opens a file for writing.
+pub fn create(path: &Path) -> miette::Result<BufWriter<File>> {
+    Ok(BufWriter::new(File::create(path).map_err(at(path))?))
+}
+
+/// Says of an error of the system which path it is about.
+pub fn at(path: &Path) -> impl Fn(io::Error) -> Error {
+    move |source| Error::Io {
+        path: path.display().to_string(),
+        source,
+    }
+}
+
+/// `frame_00042.png`
+fn frame_path(folder: &Path, frame: u64, extension: &str) -> PathBuf {
+    folder.join(format!("frame_{frame:05}.{extension}"))
+}

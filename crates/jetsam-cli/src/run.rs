@@ -1,0 +1,164 @@
+//! `jetsam run`: a scene from its beginning to its end, frame by frame.
+
+use crate::args::Run;
+use crate::output::Outputs;
+use crate::terminal::{progress, say, seconds, table};
+use crate::{Outcome, terminal};
+use jetsam::{Recorder, Scene, Summary, World};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Runs a scene and writes what was asked for.
+pub fn run(args: &Run) -> miette::Result<Outcome> {
+    set_threads(args.threads)?;
+    let mut input = args.input.clone();
+    input
+        .set
+        .extend(args.seed.map(|seed| format!("world.seed={seed}")));
+    let scene = input.open()?;
+    let folder = args.out.clone().unwrap_or_else(|| folder_of(&input.scene));
+    let mut world = World::from_scene(&scene).map_err(|e| *e)?;
+    for warning in &world.model().warnings {
+        say(&format!("warning: {warning}"));
+    }
+    let mut outputs = Outputs::create(&folder, &args.save, &scene, &world)?;
+    let times = Frames::of(&scene, args);
+    let bar = progress(times.count, &input.scene);
+    let mut recorder = Recorder::default();
+    outputs.write(&world, &recorder.frame(&world, Duration::ZERO))?;
+    for frame in 1..=times.count {
+        let start = Instant::now();
+        world.advance(times.at(frame), |_, step| step.finite);
+        let stats = recorder.frame(&world, start.elapsed());
+        outputs.write(&world, &stats)?;
+        bar.set_message(format!("real-time factor {:.3}", stats.real_time_factor));
+        bar.inc(1);
+        if stats.nonfinite > 0 {
+            break;
+        }
+    }
+    bar.finish_and_clear();
+    outputs.finish()?;
+    let summary = recorder.summary(&world);
+    say(&describe(&summary, &folder));
+    Ok(judge(&scene, &summary))
+}
+
+/// Sets how many threads compute; before anything is computed.
+pub fn set_threads(threads: Option<u16>) -> miette::Result<()> {
+    if let Some(n) = threads {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n.into())
+            .build_global();
+        pool.map_err(|e| miette::miette!("{n} threads cannot be started: {e}"))?;
+    }
+    Ok(())
+}
+
+/// When frames end: whole frame lengths, and the last at the end of the run.
+struct Frames {
+    count: u64,
+    rate: f64,
+    end: f64,
+}
+
+impl Frames {
+    fn of(scene: &Scene, args: &Run) -> Self {
+        let rate = scene.run.frames_per_second;
+        match args.frames {
+            Some(count) => Self {
+                count,
+                rate,
+                end: f64::INFINITY,
+            },
+            None => {
+                let end = args.seconds.unwrap_or(scene.run.seconds);
+                Self {
+                    count: (end * rate - 1e-9).ceil().max(0.0) as u64,
+                    rate,
+                    end,
+                }
+            }
+        }
+    }
+
+    fn at(&self, frame: u64) -> f64 {
+        (frame as f64 / self.rate).min(self.end)
+    }
+}
+
+fn folder_of(scene: &str) -> PathBuf {
+    let name = Path::new(scene).file_stem().unwrap_or(scene.as_ref());
+    Path::new("out").join(name)
+}
+
+fn describe(s: &Summary, folder: &Path) -> String {
+    let bound = s
+        .dt_bound
+        .map_or(String::new(), |b| format!(", bounded by {}", b.name()));
+    let bodies = match s.bodies {
+        0 => String::new(),
+        n => format!(", {n} bodies of {} particles", s.rigid_particles),
+    };
+    let left = if s.left > 0 {
+        format!(" ({} left through open sides)", s.left)
+    } else {
+        String::new()
+    };
+    table(&[
+        (
+            "real-time factor",
+            format!(
+                "{:.3}  ({:.2} s in {:.1} s)",
+                s.real_time_factor, s.time, s.wall_s
+            ),
+        ),
+        (
+            "steps",
+            format!("{}, mean {}{bound}", s.steps, seconds(s.dt)),
+        ),
+        ("particles", format!("{} fluid{bodies}", s.fluid)),
+        (
+            "density error",
+            format!(
+                "mean {:.2} %, max {:.2} %",
+                100.0 * s.density_error_mean,
+                100.0 * s.density_error_max
+            ),
+        ),
+        ("lost particles", format!("{}{left}", s.lost)),
+        ("momentum residual", format!("{:.1e}", s.momentum_residual)),
+        ("state hash", s.state_hash.clone()),
+        ("output", folder.display().to_string()),
+    ])
+}
+
+/// Whether the run can be believed.
+fn judge(scene: &Scene, summary: &Summary) -> Outcome {
+    let mut outcome = Outcome::Fine;
+    let mut blame = |message: String, help: &str| {
+        terminal::say(&format!("error: {message}\nhelp: {help}"));
+        outcome = Outcome::WentWrong;
+    };
+    if summary.nonfinite > 0 {
+        let message = format!(
+            "{} values were not finite at {:.4} s; the run was stopped",
+            summary.nonfinite, summary.time
+        );
+        blame(
+            message,
+            "`jetsam check` shows the stability margins; remove a stated dt, stiffness or sound_speed",
+        );
+    }
+    if summary.lost as f64 > scene.run.lost_allowed {
+        let message = format!(
+            "{} particles were lost, {} are allowed",
+            summary.lost, scene.run.lost_allowed
+        );
+        blame(
+            message,
+            "lower solver.courant or raise solver.sound_speed; [run] lost_allowed states how many may be lost",
+        );
+    }
+    outcome
+}

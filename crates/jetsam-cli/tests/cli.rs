@@ -1,0 +1,694 @@
+//! The command line as a contract: fields, exit statuses, and what is said of wrong input.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A tank of about 500 fluid particles with a ball above it; runs in well under a second.
+const POOL: &str = r#"title = "A small pool"
+
+[domain]
+min = [0.0, 0.0, 0.0]
+max = [0.5, 0.5, 0.8]
+
+[resolution]
+spacing = 0.05
+
+[run]
+seconds = 0.06
+
+[[fluid]]
+name = "water"
+shape = { box = { min = [0.0, 0.0, 0.0], max = [0.5, 0.5, 0.25] } }
+
+[[rigid]]
+name = "ball, red"
+shape = { sphere = { center = [0.0, 0.0, 0.0], radius = 0.1 } }
+density = 500
+position = [0.25, 0.25, 0.5]
+"#;
+
+/// A folder of its own for each test, empty at the beginning.
+fn folder(test: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).unwrap();
+    path
+}
+
+fn scene(folder: &Path, text: &str) -> String {
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, text).unwrap();
+    path.display().to_string()
+}
+
+fn monkey() -> String {
+    concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../scenes/meshes/monkey.obj"
+    )
+    .into()
+}
+
+fn jetsam(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_jetsam"))
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Stdout of a command that must succeed.
+fn good(folder: &Path, args: &[&str]) -> String {
+    let out = jetsam(folder, args);
+    assert_eq!(
+        out.status.code(),
+        Some(0),
+        "{args:?}: {}",
+        text(&out.stderr)
+    );
+    text(&out.stdout)
+}
+
+/// Stderr of a command that must end with status 2, say all of `needles`, and print no data.
+fn bad(folder: &Path, args: &[&str], needles: &[&str]) -> String {
+    let out = jetsam(folder, args);
+    let message = text(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{args:?}: {message}");
+    for needle in needles {
+        assert!(
+            message.contains(needle),
+            "{args:?} does not say {needle:?}: {message}"
+        );
+    }
+    assert!(!message.contains("panicked"), "{message}");
+    assert!(
+        out.stdout.is_empty(),
+        "{args:?} printed data: {}",
+        text(&out.stdout)
+    );
+    message
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+fn assert_keys(value: &Value, keys: &str) {
+    for key in keys.split_whitespace() {
+        assert!(value.get(key).is_some(), "no `{key}` in {value}");
+    }
+}
+
+/// The pool with one line replaced.
+fn pool_with(line: &str, by: &str) -> String {
+    assert!(POOL.contains(line), "{line}");
+    POOL.replace(line, by)
+}
+
+#[test]
+fn run_writes_what_the_contract_says() {
+    let dir = folder("run");
+    let file = scene(&dir, POOL);
+    let run = jetsam(
+        &dir,
+        &[
+            "run",
+            &file,
+            "--headless",
+            "--save",
+            "png,ply,vtk,csv",
+            "--out",
+            "a/b",
+        ],
+    );
+    assert_eq!(run.status.code(), Some(0), "{}", text(&run.stderr));
+    let out = dir.join("a/b");
+
+    let stats = std::fs::read_to_string(out.join("stats.jsonl")).unwrap();
+    let lines: Vec<Value> = stats.lines().map(json).collect();
+    assert_eq!(lines.len(), 4, "frame 0 and one each 0.02 s");
+    let keys = "frame time steps dt dt_bound fluid rigid_particles bodies agents lost nonfinite density_error_mean \
+                density_error_max momentum momentum_residual kinetic_energy potential_energy wall_ms real_time_factor stage_ms";
+    let mut from = 0;
+    for key in keys.split_whitespace() {
+        let at = stats[from..]
+            .find(&format!("\"{key}\":"))
+            .unwrap_or_else(|| panic!("`{key}` is missing or out of order"));
+        from += at;
+    }
+    for (n, line) in lines.iter().enumerate() {
+        assert_keys(line, keys);
+        assert_eq!(line["frame"], n);
+        assert!((line["time"].as_f64().unwrap() - 0.02 * n as f64).abs() < 1e-12);
+        assert_eq!(line["momentum"].as_array().unwrap().len(), 3);
+        assert_eq!(
+            (&line["bodies"], &line["lost"], &line["nonfinite"]),
+            (&1.into(), &0.into(), &0.into())
+        );
+    }
+    let last = &lines[3];
+    let dt = 0.02 / last["steps"].as_f64().unwrap();
+    assert!((last["dt"].as_f64().unwrap() / dt - 1.0).abs() < 1e-9);
+    assert_eq!(last["stage_ms"].as_object().unwrap().len(), 9);
+
+    let bodies = std::fs::read_to_string(out.join("bodies.csv")).unwrap();
+    let mut rows = bodies.lines();
+    assert_eq!(
+        rows.next(),
+        Some("time,body,name,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz,fx,fy,fz,tx,ty,tz")
+    );
+    assert_eq!(rows.clone().count(), 4);
+    assert!(
+        rows.all(|r| r.contains(",\"ball, red\",") && r.split(',').count() == 23),
+        "{bodies}"
+    );
+
+    for extension in ["png", "ply", "vtk"] {
+        for frame in 0..4 {
+            let path = out.join(format!("frame_{frame:05}.{extension}"));
+            assert!(
+                std::fs::metadata(&path).is_ok_and(|m| m.len() > 1000),
+                "{path:?}"
+            );
+        }
+    }
+    let ply = text(&std::fs::read(out.join("frame_00003.ply")).unwrap());
+    let particles = last["fluid"].as_u64().unwrap() + last["rigid_particles"].as_u64().unwrap();
+    assert!(ply.contains(&format!("element vertex {particles}\n")));
+    for name in "x y z vx vy vz density pressure kind owner id".split(' ') {
+        assert!(ply.contains(&format!(" {name}\n")), "{name}");
+    }
+}
+
+#[test]
+fn a_run_is_quiet_in_a_pipe_and_repeats_to_the_last_bit() {
+    let dir = folder("quiet");
+    let file = scene(&dir, POOL);
+    let hash = |threads: &str, out: &str| {
+        let run = jetsam(
+            &dir,
+            &[
+                "run",
+                &file,
+                "--save",
+                "csv",
+                "--threads",
+                threads,
+                "--out",
+                out,
+            ],
+        );
+        let message = text(&run.stderr);
+        assert!(run.stdout.is_empty(), "{}", text(&run.stdout));
+        assert!(
+            message.lines().count() < 12 && !message.contains(['\r', '\u{1b}']),
+            "{message}"
+        );
+        let line = message
+            .lines()
+            .find(|l| l.starts_with("state hash"))
+            .unwrap()
+            .to_owned();
+        (
+            line,
+            std::fs::read(dir.join(out).join("bodies.csv")).unwrap(),
+        )
+    };
+    assert_eq!(hash("1", "one"), hash("3", "three"));
+}
+
+#[test]
+fn the_last_frame_ends_with_the_run() {
+    let dir = folder("lengths");
+    let file = scene(&dir, POOL);
+    let times = |args: &[&str]| -> Vec<f64> {
+        good(
+            &dir,
+            &[&["run", &file, "--save", "csv", "--out", "o"], args].concat(),
+        );
+        let stats = std::fs::read_to_string(dir.join("o/stats.jsonl")).unwrap();
+        stats
+            .lines()
+            .map(|l| json(l)["time"].as_f64().unwrap())
+            .collect()
+    };
+    assert_eq!(times(&["--seconds", "0.03"]), [0.0, 0.02, 0.03]);
+    assert_eq!(times(&["--frames", "1"]), [0.0, 0.02]);
+    assert_eq!(times(&["--seconds", "0"]), [0.0]);
+}
+
+#[test]
+fn too_many_lost_particles_are_status_1() {
+    let dir = folder("lost");
+    // a step a thousand times too long throws particles through the walls
+    let text_of = pool_with(
+        "[run]",
+        "[solver]\ndt = 0.02\ncourant = 1.0\ncourant_force = 1.0\nsound_speed = 900.0\n\n[run]",
+    );
+    let file = scene(&dir, &text_of.replace("[[rigid]]", "[[fluid]]\nshape = { box = { min = [0.1, 0.1, 0.4], max = [0.3, 0.3, 0.6] } }\nvelocity = [90000.0, 0.0, 0.0]\n\n[[rigid]]"));
+    let out = jetsam(&dir, &["run", &file, "--save", "csv", "--out", "o"]);
+    assert_eq!(out.status.code(), Some(1), "{}", text(&out.stderr));
+    assert!(
+        text(&out.stderr).contains("help: "),
+        "{}",
+        text(&out.stderr)
+    );
+}
+
+#[test]
+fn voxelize_says_what_the_contract_says() {
+    let dir = folder("voxelize");
+    let keys = "particles spacing triangles volume_mesh volume_particles com inertia watertight boundary_edges \
+                nonmanifold_edges flipped_shells rule millis backend";
+    for fineness in [
+        ["--particles", "500"],
+        ["--resolution", "12"],
+        ["--spacing", "0.09"],
+    ] {
+        let report = json(&good(
+            &dir,
+            &[
+                "voxelize",
+                &monkey(),
+                fineness[0],
+                fineness[1],
+                "--json",
+                "--out",
+                "m.ply",
+            ],
+        ));
+        assert_keys(&report, keys);
+        let header = format!("element vertex {}\n", report["particles"]);
+        assert!(text(&std::fs::read(dir.join("m.ply")).unwrap()).contains(&header));
+    }
+    let turned = [
+        "voxelize",
+        &monkey(),
+        "--spacing",
+        "0.09",
+        "--offset",
+        "-1,0,2",
+        "--rotate",
+        "0,0,1,90",
+        "--rule",
+        "parity",
+        "--json",
+    ];
+    let report = json(&good(&dir, &turned));
+    assert!(
+        (report["com"][0].as_f64().unwrap() + 1.0).abs() < 0.05,
+        "{report}"
+    );
+    assert_eq!(report["rule"], "parity");
+
+    let series = good(
+        &dir,
+        &[
+            "voxelize",
+            &monkey(),
+            "--particles",
+            "40",
+            "--series",
+            "3",
+            "--out",
+            "s",
+            "--json",
+        ],
+    );
+    let counts: Vec<f64> = series
+        .lines()
+        .map(|l| json(l)["particles"].as_f64().unwrap())
+        .collect();
+    assert_eq!(counts.len(), 3);
+    assert!(
+        counts
+            .windows(2)
+            .all(|w| (1.8..2.2).contains(&(w[1] / w[0]))),
+        "{counts:?}"
+    );
+    assert!(dir.join("s/series_02.png").is_file());
+}
+
+#[test]
+fn bench_and_check_say_what_the_contract_says() {
+    let dir = folder("bench");
+    let file = scene(&dir, POOL);
+    let lines = good(
+        &dir,
+        &[
+            "bench",
+            &file,
+            "--particles",
+            "300",
+            "--particles",
+            "1500",
+            "--steps",
+            "5",
+            "--json",
+        ],
+    );
+    let cases: Vec<Value> = lines.lines().map(json).collect();
+    assert_eq!(cases.len(), 2);
+    for (case, wanted) in cases.iter().zip([300.0, 1500.0]) {
+        assert_keys(
+            case,
+            "scene backend device particles neighbours steps ms_per_step particle_steps_per_s real_time_factor",
+        );
+        assert_keys(
+            case,
+            "density_error_mean peak_mb threads stage_ms state_hash",
+        );
+        assert_eq!(
+            (&case["steps"], &case["backend"]),
+            (&5.into(), &"cpu".into())
+        );
+        let particles = case["particles"].as_f64().unwrap();
+        assert!(
+            (0.7..1.6).contains(&(particles / wanted)),
+            "{particles} for {wanted}"
+        );
+        assert!(
+            case["real_time_factor"].as_f64().unwrap() > 0.0
+                && case["peak_mb"].as_f64().unwrap() > 0.0
+        );
+    }
+    assert!(good(&dir, &["bench", "--list"]).contains("dam-break"));
+
+    let check = json(&good(&dir, &["check", &file, "--json"]));
+    assert_keys(
+        &check,
+        "fluid rigid_particles static_particles dt dt_bound sound_speed margins warnings",
+    );
+    assert_eq!(check["fluid"], 500);
+    for margin in check["margins"].as_array().unwrap() {
+        assert!(
+            margin["value"].as_f64().unwrap() <= 1.000_001 * margin["limit"].as_f64().unwrap(),
+            "{margin}"
+        );
+    }
+    assert!(good(&dir, &["check", &file]).contains("time step"));
+}
+
+#[test]
+fn the_schema_knows_every_key_of_the_built_in_scenes() {
+    let dir = folder("schema");
+    let schema = json(&good(&dir, &["schema"]));
+    let scenes = json(&good(&dir, &["scenes", "--json"]));
+    assert_eq!(scenes[0]["name"], "monkey-splash");
+    for scene in scenes.as_array().unwrap() {
+        let name = scene["name"].as_str().unwrap();
+        let path = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let table: toml::Table = toml::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+        accepts(
+            &schema,
+            &schema,
+            &serde_json::to_value(table).unwrap(),
+            name,
+        );
+    }
+}
+
+/// Every key of a value is named by the schema, through references, arrays and alternatives.
+fn accepts(root: &Value, schema: &Value, value: &Value, place: &str) {
+    let schema = match schema["$ref"].as_str() {
+        Some(reference) => root.pointer(reference.trim_start_matches('#')).unwrap(),
+        None => schema,
+    };
+    let alternatives = ["anyOf", "oneOf"].iter().find_map(|k| schema[k].as_array());
+    match value {
+        Value::Object(map) => {
+            for (key, value) in map {
+                let named = |s: &Value| {
+                    let s = s["$ref"]
+                        .as_str()
+                        .map_or(s, |r| root.pointer(r.trim_start_matches('#')).unwrap());
+                    s["properties"].get(key).cloned()
+                };
+                let child = named(schema).or_else(|| alternatives?.iter().find_map(named));
+                accepts(
+                    root,
+                    &child.unwrap_or_else(|| panic!("{place}.{key} is not in the schema")),
+                    value,
+                    &format!("{place}.{key}"),
+                );
+            }
+        }
+        Value::Array(items) => items
+            .iter()
+            .for_each(|item| accepts(root, &schema["items"], item, place)),
+        _ => {}
+    }
+}
+
+#[test]
+fn a_scene_that_cannot_be_read_is_status_2() {
+    let dir = folder("unreadable");
+    bad(&dir, &["run", "nowhere.toml"], &["nowhere.toml", "help: "]);
+    bad(&dir, &["run", "dam-brake"], &["did you mean `dam-break`"]);
+    bad(&dir, &["run", "."], &["help: "]);
+    let binary = dir.join("binary.toml");
+    std::fs::write(&binary, [0xff, 0xfe, 0, 1, 2]).unwrap();
+    bad(&dir, &["check", "binary.toml"], &["binary.toml", "help: "]);
+    for line in ["", "title = ", "[domain]\nmin = 3\n", "fluid = 7", "= = ="] {
+        bad(&dir, &["check", &scene(&dir, line)], &["help: "]);
+    }
+}
+
+#[test]
+fn wrong_values_are_named_with_line_and_remedy() {
+    let dir = folder("values");
+    let check = |line: &str, by: &str, needles: &[&str]| {
+        let file = scene(&dir, &pool_with(line, by));
+        bad(&dir, &["check", &file], &[needles, &["help: "]].concat())
+    };
+    let water = "name = \"water\"";
+    let ball = "density = 500";
+    let shape = "shape = { sphere = { center = [0.0, 0.0, 0.0], radius = 0.1 } }";
+    check(
+        water,
+        "name = \"water\"\nviscosty = 1",
+        &["scene.toml:15", "did you mean `viscosity`"],
+    );
+    check(water, "density = -3", &["scene.toml:14", "-3"]);
+    check(ball, "density = -500", &["scene.toml:20", "-500"]);
+    check(ball, "density = nan", &["scene.toml:20"]);
+    check(ball, "", &["scene.toml:17", "density"]);
+    check("spacing = 0.05", "spacing = 1e-6", &["scene.toml:8", "GB"]);
+    check("spacing = 0.05", "spacing = 0", &["scene.toml:8"]);
+    check("spacing = 0.05", "spacing = 50", &["help: "]);
+    check(
+        "0.25, 0.25, 0.5",
+        "0.25, 0.25, 0.75",
+        &["scene.toml:21", "outside the domain"],
+    );
+    check("0.25, 0.25, 0.5", "1e300, 0, 0", &["scene.toml:21"]);
+    check(
+        "max = [0.5, 0.5, 0.8]",
+        "max = [0.5, -0.5, 0.8]",
+        &["scene.toml:5"],
+    );
+    check(
+        "max = [0.5, 0.5, 0.8]",
+        "max = [0.5, 1e30, 0.8]",
+        &["help: "],
+    );
+    check("radius = 0.1", "radius = -0.1", &["scene.toml:19"]);
+    check(
+        "max = [0.5, 0.5, 0.25]",
+        "max = [0.5, 0.5, -0.25]",
+        &["scene.toml:15"],
+    );
+    check(
+        shape,
+        "shape = { mesh = { path = \"gone.obj\" } }",
+        &["scene.toml:19", "gone.obj"],
+    );
+    std::fs::write(
+        dir.join("broken.obj"),
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
+    )
+    .unwrap();
+    check(
+        shape,
+        "shape = { mesh = { path = \"broken.obj\" } }",
+        &["scene.toml:19", "broken.obj"],
+    );
+    std::fs::write(dir.join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    check(
+        shape,
+        "shape = { mesh = { path = \"flat.obj\", scale = 0.1 } }",
+        &["scene.toml:19", "flat.obj"],
+    );
+    check(
+        shape,
+        "shape = { mesh = { path = \"flat.obj\", scale = 1e12 } }",
+        &["scene.toml:19"],
+    );
+    check(
+        ball,
+        "density = 500\ncopies = { count = 4000000000, grid = { columns = [1, 1], step = [0, 0, 0.1] } }",
+        &["scene.toml:21", "too many"],
+    );
+    check(
+        ball,
+        "density = 500\ncopies = { count = 50, random = { min = [0, 0, 0.3], max = [0.5, 0.5, 0.8] } }",
+        &["scene.toml", "copies fit"],
+    );
+    check(
+        ball,
+        "density = 500\ncopies = { count = 2 }",
+        &["scene.toml", "grid"],
+    );
+    check("[run]", "[run]\nframes_per_second = 0", &["scene.toml:11"]);
+    check("[run]", "[world]\ndimensions = 4\n[run]", &["dimensions"]);
+}
+
+#[test]
+fn wrong_arguments_are_status_2() {
+    let dir = folder("arguments");
+    let file = scene(&dir, POOL);
+    bad(
+        &dir,
+        &["run", &file, "--set", "solver.supprt=2"],
+        &["did you mean `support`"],
+    );
+    bad(
+        &dir,
+        &["run", &file, "--set", "nonsense"],
+        &["--set key=value"],
+    );
+    bad(
+        &dir,
+        &["run", &file, "--set", "rigid.7.density=3"],
+        &["help: "],
+    );
+    bad(
+        &dir,
+        &["run", &file, "--set", "fluid.0.density=heavy"],
+        &["help: "],
+    );
+    bad(
+        &dir,
+        &["run", &file, "--set", "fluid.0.density=-1"],
+        &["help: "],
+    );
+    bad(&dir, &["run", &file, "--backend", "gpu"], &["gpu"]);
+    bad(&dir, &["run", &file, "--save", "gif"], &["gif"]);
+    bad(&dir, &["run", &file, "--seconds", "-1"], &["seconds"]);
+    bad(&dir, &["run", &file, "--threads", "0"], &["threads"]);
+    bad(
+        &dir,
+        &["run", &file, "--out", &format!("{file}/below")],
+        &["scene.toml", "help: "],
+    );
+    bad(&dir, &["frobnicate"], &["frobnicate"]);
+    bad(&dir, &["voxelize", &monkey()], &["--spacing"]);
+    bad(
+        &dir,
+        &["voxelize", &monkey(), "--spacing", "-1"],
+        &["spacing"],
+    );
+    bad(
+        &dir,
+        &["voxelize", &monkey(), "--spacing", "1e-9"],
+        &["cells"],
+    );
+    bad(
+        &dir,
+        &["voxelize", "gone.stl", "--particles", "10"],
+        &["gone.stl", "help: "],
+    );
+    bad(
+        &dir,
+        &[
+            "voxelize",
+            &monkey(),
+            "--particles",
+            "10",
+            "--out",
+            "no/folder/m.ply",
+        ],
+        &["help: "],
+    );
+    bad(&dir, &["bench", "nowhere.toml"], &["nowhere.toml"]);
+}
+
+#[test]
+fn a_video_without_ffmpeg_is_status_2() {
+    let dir = folder("video");
+    let file = scene(&dir, POOL);
+    let args = ["run", &file, "--save", "mp4", "--out", "o"];
+    let out = Command::new(env!("CARGO_BIN_EXE_jetsam"))
+        .args(args)
+        .current_dir(&dir)
+        .env("PATH", "")
+        .output()
+        .unwrap();
+    assert_eq!(out.status.code(), Some(2));
+    assert!(
+        text(&out.stderr).contains("install ffmpeg"),
+        "{}",
+        text(&out.stderr)
+    );
+}
+
+#[test]
+fn fluid_gives_way_to_bodies_and_says_so() {
+    let dir = folder("carve");
+    let file = scene(&dir, &pool_with("0.25, 0.25, 0.5", "0.25, 0.25, 0.12"));
+    let check = json(&good(&dir, &["check", &file, "--json"]));
+    assert!(check["fluid"].as_u64().unwrap() < 500);
+    assert!(
+        check["warnings"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|w| w.as_str().unwrap().contains("carved")),
+        "{check}"
+    );
+    let run = jetsam(
+        &dir,
+        &["run", &file, "--frames", "1", "--save", "csv", "--out", "o"],
+    );
+    assert!(
+        text(&run.stderr).starts_with("warning: "),
+        "{}",
+        text(&run.stderr)
+    );
+}
+
+#[test]
+fn scenes_of_other_kinds_run_too() {
+    let dir = folder("kinds");
+    let flat = pool_with("[domain]", "[world]\ndimensions = 2\n\n[domain]");
+    let dry = POOL[..POOL.find("[[fluid]]").unwrap()].to_owned()
+        + &POOL[POOL.find("[[rigid]]").unwrap()..];
+    let open = pool_with(
+        "[resolution]",
+        "walls = [\"periodic\", \"open\", \"solid\"]\n\n[resolution]",
+    );
+    let settled = pool_with("[run]", "[solver]\nsettle = 0.01\n\n[run]");
+    let still = pool_with("[domain]", "[world]\ngravity = [0, 0, 0]\n\n[domain]");
+    for text in [flat, dry, open, settled, still] {
+        let file = scene(&dir, &text);
+        good(&dir, &["check", &file]);
+        good(&dir, &["run", &file, "--frames", "1", "--out", "o"]);
+        assert!(std::fs::metadata(dir.join("o/frame_00001.png")).is_ok_and(|m| m.len() > 1000));
+    }
+}
+
+#[test]
+fn help_completions_and_man_page_are_there() {
+    let dir = folder("help");
+    for command in ["run", "check", "voxelize", "bench", "scenes", "schema"] {
+        assert!(good(&dir, &["--help"]).contains(command));
+        assert!(good(&dir, &[command, "--help"]).contains("Usage"));
+    }
+    assert!(good(&dir, &["completions", "bash"]).contains("jetsam"));
+    assert!(good(&dir, &["man"]).contains(".TH"));
+}
