@@ -9,7 +9,7 @@ use crate::mesh::Mesh;
 use crate::model::{DtBound, Model};
 use crate::scene::Scene;
 use crate::stage::Stage;
-use crate::state::State;
+use crate::state::{Kind, Record, State};
 use glam::DVec3;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -167,6 +167,12 @@ impl World {
     /// The present state.
     pub fn state(&self) -> &State {
         self.backend.download()
+    }
+
+    /// The living particles of all fluids: place (m), velocity (m/s) and, between pairs, volume and pressure share.
+    pub fn fluid(&self) -> impl Iterator<Item = &Record> {
+        let particles = &self.state().particles;
+        particles.record[particles.segment(Kind::Fluid)].iter()
     }
 
     /// What the last step left behind.
