@@ -5,7 +5,8 @@ use crate::output::Outputs;
 use crate::terminal::{progress, say, seconds, table};
 use crate::{Outcome, terminal};
 use jetsam::{Recorder, Scene, Summary, World};
-use std::path::{Path, PathBuf};
+use std::ffi::OsStr;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Runs a scene and writes what was asked for.
@@ -16,14 +17,17 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
         .set
         .extend(args.seed.map(|seed| format!("world.seed={seed}")));
     let scene = input.open()?;
-    let folder = args.out.clone().unwrap_or_else(|| folder_of(&input.scene));
+    let folder = args
+        .out
+        .clone()
+        .unwrap_or_else(|| Path::new("out").join(name_of(&input.scene)));
     let mut world = World::from_scene(&scene).map_err(|e| *e)?;
     for warning in &world.model().warnings {
         say(&format!("warning: {warning}"));
     }
     let mut outputs = Outputs::create(&folder, &args.save, &scene, &world)?;
     let times = Frames::of(&scene, args);
-    let bar = progress(times.count, &input.scene);
+    let bar = progress(times.count, &name_of(&input.scene).to_string_lossy());
     let mut recorder = Recorder::default();
     outputs.write(&world, &recorder.frame(&world, Duration::ZERO))?;
     for frame in 1..=times.count {
@@ -87,9 +91,9 @@ impl Frames {
     }
 }
 
-fn folder_of(scene: &str) -> PathBuf {
-    let name = Path::new(scene).file_stem().unwrap_or(scene.as_ref());
-    Path::new("out").join(name)
+/// A scene's name: that of its file, where it is a path.
+fn name_of(scene: &str) -> &OsStr {
+    Path::new(scene).file_stem().unwrap_or(scene.as_ref())
 }
 
 fn describe(s: &Summary, folder: &Path) -> String {
@@ -109,8 +113,10 @@ fn describe(s: &Summary, folder: &Path) -> String {
         (
             "real-time factor",
             format!(
-                "{:.3}  ({:.2} s in {:.1} s)",
-                s.real_time_factor, s.time, s.wall_s
+                "{:.3}  ({} in {})",
+                s.real_time_factor,
+                seconds(s.time),
+                seconds(s.wall_s)
             ),
         ),
         (

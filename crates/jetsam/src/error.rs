@@ -35,5 +35,5 @@ pub enum Error {
     },
 }
 
-/// Result with [`Error`], boxed to keep it small.
+/// Result with [`enum@Error`], boxed to keep it small.
 pub type Result<T> = std::result::Result<T, Box<Error>>;
