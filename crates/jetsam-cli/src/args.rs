@@ -202,11 +202,7 @@ pub struct Scenes {
 
 fn not_negative(text: &str) -> Result<f64, String> {
     let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    if number >= 0.0 && number.is_finite() {
-        Ok(number)
-    } else {
-        Err("must be finite and not negative".into())
-    }
+    if number >= 0.0 && number.is_finite() { Ok(number) } else { Err("must be finite and not negative".into()) }
 }
 
 fn rule(text: &str) -> Result<Rule, String> {
@@ -218,11 +214,7 @@ fn rule(text: &str) -> Result<Rule, String> {
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let all: Result<Vec<f64>, _> = text
-        .split(',')
-        .map(|part| part.trim().parse::<f64>())
-        .collect();
+    let all: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
     let all = all.map_err(|_| format!("{N} numbers separated by commas are needed"))?;
-    all.try_into()
-        .map_err(|_| format!("{N} numbers separated by commas are needed"))
+    all.try_into().map_err(|_| format!("{N} numbers separated by commas are needed"))
 }

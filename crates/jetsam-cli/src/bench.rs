@@ -10,7 +10,8 @@ use jetsam::{Scene, World, state_hash};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
-const HEADER: &str = "scene            particles  ms/step  Mparticle-steps/s  real-time  density err  peak MB  state hash";
+const HEADER: &str =
+    "scene            particles  ms/step  Mparticle-steps/s  real-time  density err  peak MB  state hash";
 
 /// What is said of a case.
 #[derive(Serialize)]
@@ -52,10 +53,7 @@ pub fn bench(args: &args::Bench) -> miette::Result<Outcome> {
         let scene = Scene::open(name, &args.set).map_err(|e| *e)?;
         let sizes = match args.particles.as_slice() {
             [] => vec![scene.clone()],
-            wanted => wanted
-                .iter()
-                .map(|&n| sized(&scene, n))
-                .collect::<miette::Result<_>>()?,
+            wanted => wanted.iter().map(|&n| sized(&scene, n)).collect::<miette::Result<_>>()?,
         };
         for scene in sizes {
             let case = measure(name, &scene, args.steps, &mut finite)?;
@@ -63,18 +61,10 @@ pub fn bench(args: &args::Bench) -> miette::Result<Outcome> {
                 print(HEADER);
             }
             cases += 1;
-            if args.json {
-                print_json(&case)
-            } else {
-                print(&line(&case))
-            }
+            if args.json { print_json(&case) } else { print(&line(&case)) }
         }
     }
-    Ok(if finite {
-        Outcome::Fine
-    } else {
-        Outcome::WentWrong
-    })
+    Ok(if finite { Outcome::Fine } else { Outcome::WentWrong })
 }
 
 /// The scene with a spacing that gives about so many fluid particles (bodies' where there is no fluid).
@@ -147,11 +137,7 @@ fn line(c: &Case) -> String {
 /// What the processor calls itself, where the system says so; else its architecture.
 fn device() -> String {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = cpuinfo
-        .lines()
-        .find_map(|l| l.strip_prefix("model name")?.split_once(": "));
-    let named = model
-        .map(|(_, name)| name.trim().to_owned())
-        .or_else(|| std::env::var("PROCESSOR_IDENTIFIER").ok());
+    let model = cpuinfo.lines().find_map(|l| l.strip_prefix("model name")?.split_once(": "));
+    let named = model.map(|(_, name)| name.trim().to_owned()).or_else(|| std::env::var("PROCESSOR_IDENTIFIER").ok());
     named.unwrap_or_else(|| std::env::consts::ARCH.into())
 }

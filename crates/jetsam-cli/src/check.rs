@@ -61,10 +61,7 @@ fn find(name: &str, scene: &Scene, world: &World) -> Findings {
     let (dt, dt_bound) = model.largest_dt(model.largest_speed, ledger.acceleration);
     let static_bodies = bodies.iter().filter(|b| b.is_static()).count();
     let count = world.state().particles.count;
-    let (margins, mut warnings) = (
-        margins(model, dt, ledger.acceleration),
-        model.warnings.clone(),
-    );
+    let (margins, mut warnings) = (margins(model, dt, ledger.acceleration), model.warnings.clone());
     for margin in margins.iter().filter(|m| m.value > 1.000_001 * m.limit) {
         warnings.push(format!(
             "{} = {:.3} is above its limit {:.3} ({})",
@@ -100,49 +97,18 @@ fn margins(model: &Model, dt: f64, acceleration: f64) -> Vec<Margin> {
     let h = 0.5 * model.support;
     let mut add = |name, value: f64, limit, meaning| {
         if value.is_finite() {
-            all.push(Margin {
-                name,
-                value,
-                limit,
-                meaning,
-            });
+            all.push(Margin { name, value, limit, meaning });
         }
     };
     if !model.fluids.is_empty() {
         let s = &model.solver;
-        let viscosity = model
-            .fluids
-            .iter()
-            .map(|f| f64::from(f.viscosity / f.density))
-            .fold(0.0, f64::max);
-        add(
-            "acoustic",
-            dt * (model.sound_speed + model.largest_speed) / h,
-            s.courant,
-            "dt (c_0 + v) / h",
-        );
-        add(
-            "force",
-            dt * (acceleration / h).sqrt(),
-            s.courant_force,
-            "dt sqrt(a / h)",
-        );
-        add(
-            "viscous",
-            dt * viscosity / (h * h),
-            s.courant_viscous,
-            "dt nu / h^2",
-        );
-        add(
-            "mach",
-            model.largest_speed / model.sound_speed,
-            0.1,
-            "v / c_0; above it density errors exceed 1 %",
-        );
+        let viscosity = model.fluids.iter().map(|f| f64::from(f.viscosity / f.density)).fold(0.0, f64::max);
+        add("acoustic", dt * (model.sound_speed + model.largest_speed) / h, s.courant, "dt (c_0 + v) / h");
+        add("force", dt * (acceleration / h).sqrt(), s.courant_force, "dt sqrt(a / h)");
+        add("viscous", dt * viscosity / (h * h), s.courant_viscous, "dt nu / h^2");
+        add("mach", model.largest_speed / model.sound_speed, 0.1, "v / c_0; above it density errors exceed 1 %");
     }
-    let shortest = (0..model.contacts.len())
-        .map(|b| model.contact_time(b))
-        .fold(f64::INFINITY, f64::min);
+    let shortest = (0..model.contacts.len()).map(|b| model.contact_time(b)).fold(f64::INFINITY, f64::min);
     if shortest.is_finite() {
         add("contact", PI * dt / shortest, 2.0, "omega dt");
     }
@@ -152,47 +118,17 @@ fn margins(model: &Model, dt: f64, acceleration: f64) -> Vec<Margin> {
 fn describe(f: &Findings) -> String {
     let mut rows = vec![
         ("scene", format!("{} ({})", f.scene, f.title)),
-        (
-            "particles",
-            format!(
-                "{} fluid, {} rigid, {} static",
-                f.fluid, f.rigid_particles, f.static_particles
-            ),
-        ),
-        (
-            "bodies",
-            format!("{} rigid, {} static", f.bodies, f.static_bodies),
-        ),
-        (
-            "spacing",
-            format!(
-                "{} m, support {} m, {:.1} neighbours",
-                f.spacing, f.support, f.neighbours
-            ),
-        ),
+        ("particles", format!("{} fluid, {} rigid, {} static", f.fluid, f.rigid_particles, f.static_particles)),
+        ("bodies", format!("{} rigid, {} static", f.bodies, f.static_bodies)),
+        ("spacing", format!("{} m, support {} m, {:.1} neighbours", f.spacing, f.support, f.neighbours)),
         (
             "time step",
-            format!(
-                "{}, bounded by {}; {} steps for {} s",
-                seconds(f.dt),
-                f.dt_bound.name(),
-                f.steps,
-                f.seconds
-            ),
+            format!("{}, bounded by {}; {} steps for {} s", seconds(f.dt), f.dt_bound.name(), f.steps, f.seconds),
         ),
-        (
-            "speeds",
-            format!(
-                "largest {:.3} m/s, sound {:.3} m/s",
-                f.largest_speed, f.sound_speed
-            ),
-        ),
+        ("speeds", format!("largest {:.3} m/s, sound {:.3} m/s", f.largest_speed, f.sound_speed)),
     ];
     for m in &f.margins {
-        rows.push((
-            m.name,
-            format!("{:.3} of {:.3}  ({})", m.value, m.limit, m.meaning),
-        ));
+        rows.push((m.name, format!("{:.3} of {:.3}  ({})", m.value, m.limit, m.meaning)));
     }
     rows.extend(f.warnings.iter().map(|w| ("warning", w.clone())));
     table(&rows)

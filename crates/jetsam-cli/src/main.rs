@@ -29,10 +29,7 @@ enum Outcome {
 }
 
 fn main() -> ExitCode {
-    let done = match Args::parse()
-        .command
-        .unwrap_or_else(|| Command::Run(args::Run::default_scene()))
-    {
+    let done = match Args::parse().command.unwrap_or_else(|| Command::Run(args::Run::default_scene())) {
         Command::Run(run) => run::run(&run),
         Command::Check(check) => check::check(&check),
         Command::Voxelize(voxelize) => voxelize::voxelize(&voxelize),

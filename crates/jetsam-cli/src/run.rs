@@ -13,14 +13,9 @@ use std::time::{Duration, Instant};
 pub fn run(args: &Run) -> miette::Result<Outcome> {
     set_threads(args.threads)?;
     let mut input = args.input.clone();
-    input
-        .set
-        .extend(args.seed.map(|seed| format!("world.seed={seed}")));
+    input.set.extend(args.seed.map(|seed| format!("world.seed={seed}")));
     let scene = input.open()?;
-    let folder = args
-        .out
-        .clone()
-        .unwrap_or_else(|| Path::new("out").join(name_of(&input.scene)));
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(name_of(&input.scene)));
     let mut world = World::from_scene(&scene).map_err(|e| *e)?;
     for warning in &world.model().warnings {
         say(&format!("warning: {warning}"));
@@ -51,9 +46,7 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
 /// Sets how many threads compute; before anything is computed.
 pub fn set_threads(threads: Option<u16>) -> miette::Result<()> {
     if let Some(n) = threads {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(n.into())
-            .build_global();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n.into()).build_global();
         pool.map_err(|e| miette::miette!("{n} threads cannot be started: {e}"))?;
     }
     Ok(())
@@ -70,18 +63,10 @@ impl Frames {
     fn of(scene: &Scene, args: &Run) -> Self {
         let rate = scene.run.frames_per_second;
         match args.frames {
-            Some(count) => Self {
-                count,
-                rate,
-                end: f64::INFINITY,
-            },
+            Some(count) => Self { count, rate, end: f64::INFINITY },
             None => {
                 let end = args.seconds.unwrap_or(scene.run.seconds);
-                Self {
-                    count: (end * rate - 1e-9).ceil().max(0.0) as u64,
-                    rate,
-                    end,
-                }
+                Self { count: (end * rate - 1e-9).ceil().max(0.0) as u64, rate, end }
             }
         }
     }
@@ -97,40 +82,19 @@ fn name_of(scene: &str) -> &OsStr {
 }
 
 fn describe(s: &Summary, folder: &Path) -> String {
-    let bound = s
-        .dt_bound
-        .map_or(String::new(), |b| format!(", bounded by {}", b.name()));
+    let bound = s.dt_bound.map_or(String::new(), |b| format!(", bounded by {}", b.name()));
     let bodies = match s.bodies {
         0 => String::new(),
         n => format!(", {n} bodies of {} particles", s.rigid_particles),
     };
-    let left = if s.left > 0 {
-        format!(" ({} left through open sides)", s.left)
-    } else {
-        String::new()
-    };
+    let left = if s.left > 0 { format!(" ({} left through open sides)", s.left) } else { String::new() };
     table(&[
-        (
-            "real-time factor",
-            format!(
-                "{:.3}  ({} in {})",
-                s.real_time_factor,
-                seconds(s.time),
-                seconds(s.wall_s)
-            ),
-        ),
-        (
-            "steps",
-            format!("{}, mean {}{bound}", s.steps, seconds(s.dt)),
-        ),
+        ("real-time factor", format!("{:.3}  ({} in {})", s.real_time_factor, seconds(s.time), seconds(s.wall_s))),
+        ("steps", format!("{}, mean {}{bound}", s.steps, seconds(s.dt))),
         ("particles", format!("{} fluid{bodies}", s.fluid)),
         (
             "density error",
-            format!(
-                "mean {:.2} %, max {:.2} %",
-                100.0 * s.density_error_mean,
-                100.0 * s.density_error_max
-            ),
+            format!("mean {:.2} %, max {:.2} %", 100.0 * s.density_error_mean, 100.0 * s.density_error_max),
         ),
         ("lost particles", format!("{}{left}", s.lost)),
         ("momentum residual", format!("{:.1e}", s.momentum_residual)),
@@ -147,20 +111,12 @@ fn judge(scene: &Scene, summary: &Summary) -> Outcome {
         outcome = Outcome::WentWrong;
     };
     if summary.nonfinite > 0 {
-        let message = format!(
-            "{} values were not finite at {:.4} s; the run was stopped",
-            summary.nonfinite, summary.time
-        );
-        blame(
-            message,
-            "`jetsam check` shows the stability margins; remove a stated dt, stiffness or sound_speed",
-        );
+        let message =
+            format!("{} values were not finite at {:.4} s; the run was stopped", summary.nonfinite, summary.time);
+        blame(message, "`jetsam check` shows the stability margins; remove a stated dt, stiffness or sound_speed");
     }
     if summary.lost as f64 > scene.run.lost_allowed {
-        let message = format!(
-            "{} particles were lost, {} are allowed",
-            summary.lost, scene.run.lost_allowed
-        );
+        let message = format!("{} particles were lost, {} are allowed", summary.lost, scene.run.lost_allowed);
         blame(
             message,
             "lower solver.courant or raise solver.sound_speed; [run] lost_allowed states how many may be lost",

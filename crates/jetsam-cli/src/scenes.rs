@@ -33,12 +33,7 @@ pub fn scenes(args: &args::Scenes) -> miette::Result<Outcome> {
     if args.json {
         print(&serde_json::to_string_pretty(&rows).expect("rows are plain"));
     } else {
-        print(&table(
-            &rows
-                .into_iter()
-                .map(|r| (r.name, r.title))
-                .collect::<Vec<_>>(),
-        ));
+        print(&table(&rows.into_iter().map(|r| (r.name, r.title)).collect::<Vec<_>>()));
     }
     Ok(Outcome::Fine)
 }

@@ -16,9 +16,7 @@ pub fn completions(shell: clap_complete::Shell) -> miette::Result<Outcome> {
 /// Prints the man page.
 pub fn man() -> miette::Result<Outcome> {
     let mut text = Vec::new();
-    clap_mangen::Man::new(Args::command())
-        .render(&mut text)
-        .expect("writing to memory");
+    clap_mangen::Man::new(Args::command()).render(&mut text).expect("writing to memory");
     print(&String::from_utf8_lossy(&text));
     Ok(Outcome::Fine)
 }

@@ -38,18 +38,13 @@ pub fn progress(length: u64, what: &str) -> ProgressBar {
     }
     let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {msg} eta {eta}")
         .expect("the template is well-formed");
-    ProgressBar::new(length)
-        .with_style(style)
-        .with_prefix(what.to_owned())
+    ProgressBar::new(length).with_style(style).with_prefix(what.to_owned())
 }
 
 /// Lines of two columns.
 pub fn table(rows: &[(&str, String)]) -> String {
     let width = rows.iter().map(|r| r.0.len()).max().unwrap_or(0);
-    let lines: Vec<String> = rows
-        .iter()
-        .map(|(name, value)| format!("{name:width$}  {value}"))
-        .collect();
+    let lines: Vec<String> = rows.iter().map(|(name, value)| format!("{name:width$}  {value}")).collect();
     lines.join("\n")
 }
 

@@ -18,9 +18,7 @@ pub fn voxelize(args: &args::Voxelize) -> miette::Result<Outcome> {
         let voxels = fill(&mesh, &options)?;
         if let Some(path) = &args.out {
             let mut file = output::create(path)?;
-            ply::write_points(&mut file, &voxels.points())
-                .and_then(|()| file.flush())
-                .map_err(output::at(path))?;
+            ply::write_points(&mut file, &voxels.points()).and_then(|()| file.flush()).map_err(output::at(path))?;
         }
         show(&voxels.report, args.json);
         return Ok(Outcome::Fine);
@@ -30,9 +28,7 @@ pub fn voxelize(args: &args::Voxelize) -> miette::Result<Outcome> {
     for step in 0..u32::from(count) {
         let voxels = fill(&mesh, &options)?;
         let image = pictures::of_points(&voxels.points(), voxels.spacing);
-        image
-            .save_png(folder.join(format!("series_{step:02}.png")))
-            .into_diagnostic()?;
+        image.save_png(folder.join(format!("series_{step:02}.png"))).into_diagnostic()?;
         show(&voxels.report, args.json);
         let first = voxels.report.particles.max(1) >> step;
         options.resolution = Resolution::Particles(first.max(1) << (step + 1));
@@ -46,9 +42,7 @@ fn options(args: &args::Voxelize) -> miette::Result<VoxelizeOptions> {
         (_, Some(across), _) => Resolution::Across(across),
         (.., Some(particles)) => Resolution::Particles(particles),
         _ => {
-            return Err(miette::miette!(
-                "one of --spacing, --resolution, --particles is needed"
-            ));
+            return Err(miette::miette!("one of --spacing, --resolution, --particles is needed"));
         }
     };
     let rotation = match args.rotate {
@@ -56,10 +50,7 @@ fn options(args: &args::Voxelize) -> miette::Result<VoxelizeOptions> {
         Some([x, y, z, degrees]) => {
             let axis = DVec3::new(x, y, z).try_normalize();
             let axis = axis.ok_or_else(|| {
-                miette::miette!(
-                    help = "e.g. --rotate 0,0,1,90",
-                    "--rotate: the axis has no direction"
-                )
+                miette::miette!(help = "e.g. --rotate 0,0,1,90", "--rotate: the axis has no direction")
             })?;
             DQuat::from_axis_angle(axis, degrees.to_radians())
         }
@@ -80,33 +71,19 @@ fn show(r: &VoxelReport, json: bool) {
     }
     let [x, y, z] = r.com;
     print(&table(&[
-        (
-            "particles",
-            format!("{} at a spacing of {:.6}", r.particles, r.spacing),
-        ),
+        ("particles", format!("{} at a spacing of {:.6}", r.particles, r.spacing)),
         ("triangles", r.triangles.to_string()),
-        (
-            "volume",
-            format!(
-                "{:.6e} by particles, {:.6e} by the mesh",
-                r.volume_particles, r.volume_mesh
-            ),
-        ),
+        ("volume", format!("{:.6e} by particles, {:.6e} by the mesh", r.volume_particles, r.volume_mesh)),
         ("centre of mass", format!("{x:.6}, {y:.6}, {z:.6}")),
         ("surface", surface(r)),
         ("time", format!("{:.1} ms", r.millis)),
     ]));
-    r.warnings
-        .iter()
-        .for_each(|w| say(&format!("warning: {w}")));
+    r.warnings.iter().for_each(|w| say(&format!("warning: {w}")));
 }
 
 fn surface(r: &VoxelReport) -> String {
     if r.watertight {
         return "watertight".into();
     }
-    format!(
-        "open: {} boundary edges, {} shared by more than two triangles",
-        r.boundary_edges, r.nonmanifold_edges
-    )
+    format!("open: {} boundary edges, {} shared by more than two triangles", r.boundary_edges, r.nonmanifold_edges)
 }

@@ -43,19 +43,11 @@ fn scene(folder: &Path, text: &str) -> String {
 }
 
 fn monkey() -> String {
-    concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../scenes/meshes/monkey.obj"
-    )
-    .into()
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/meshes/monkey.obj").into()
 }
 
 fn jetsam(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_jetsam"))
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .unwrap()
+    Command::new(env!("CARGO_BIN_EXE_jetsam")).args(args).current_dir(folder).output().unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -65,12 +57,7 @@ fn text(bytes: &[u8]) -> String {
 /// Stdout of a command that must succeed.
 fn good(folder: &Path, args: &[&str]) -> String {
     let out = jetsam(folder, args);
-    assert_eq!(
-        out.status.code(),
-        Some(0),
-        "{args:?}: {}",
-        text(&out.stderr)
-    );
+    assert_eq!(out.status.code(), Some(0), "{args:?}: {}", text(&out.stderr));
     text(&out.stdout)
 }
 
@@ -80,17 +67,10 @@ fn bad(folder: &Path, args: &[&str], needles: &[&str]) -> String {
     let message = text(&out.stderr);
     assert_eq!(out.status.code(), Some(2), "{args:?}: {message}");
     for needle in needles {
-        assert!(
-            message.contains(needle),
-            "{args:?} does not say {needle:?}: {message}"
-        );
+        assert!(message.contains(needle), "{args:?} does not say {needle:?}: {message}");
     }
     assert!(!message.contains("panicked"), "{message}");
-    assert!(
-        out.stdout.is_empty(),
-        "{args:?} printed data: {}",
-        text(&out.stdout)
-    );
+    assert!(out.stdout.is_empty(), "{args:?} printed data: {}", text(&out.stdout));
     message
 }
 
@@ -114,18 +94,7 @@ fn pool_with(line: &str, by: &str) -> String {
 fn run_writes_what_the_contract_says() {
     let dir = folder("run");
     let file = scene(&dir, POOL);
-    let run = jetsam(
-        &dir,
-        &[
-            "run",
-            &file,
-            "--headless",
-            "--save",
-            "png,ply,vtk,csv",
-            "--out",
-            "a/b",
-        ],
-    );
+    let run = jetsam(&dir, &["run", &file, "--headless", "--save", "png,ply,vtk,csv", "--out", "a/b"]);
     assert_eq!(run.status.code(), Some(0), "{}", text(&run.stderr));
     let out = dir.join("a/b");
 
@@ -136,9 +105,8 @@ fn run_writes_what_the_contract_says() {
                 density_error_max momentum momentum_residual kinetic_energy potential_energy wall_ms real_time_factor stage_ms";
     let mut from = 0;
     for key in keys.split_whitespace() {
-        let at = stats[from..]
-            .find(&format!("\"{key}\":"))
-            .unwrap_or_else(|| panic!("`{key}` is missing or out of order"));
+        let at =
+            stats[from..].find(&format!("\"{key}\":")).unwrap_or_else(|| panic!("`{key}` is missing or out of order"));
         from += at;
     }
     for (n, line) in lines.iter().enumerate() {
@@ -146,10 +114,7 @@ fn run_writes_what_the_contract_says() {
         assert_eq!(line["frame"], n);
         assert!((line["time"].as_f64().unwrap() - 0.02 * n as f64).abs() < 1e-12);
         assert_eq!(line["momentum"].as_array().unwrap().len(), 3);
-        assert_eq!(
-            (&line["bodies"], &line["lost"], &line["nonfinite"]),
-            (&1.into(), &0.into(), &0.into())
-        );
+        assert_eq!((&line["bodies"], &line["lost"], &line["nonfinite"]), (&1.into(), &0.into(), &0.into()));
     }
     let last = &lines[3];
     let dt = 0.02 / last["steps"].as_f64().unwrap();
@@ -158,23 +123,14 @@ fn run_writes_what_the_contract_says() {
 
     let bodies = std::fs::read_to_string(out.join("bodies.csv")).unwrap();
     let mut rows = bodies.lines();
-    assert_eq!(
-        rows.next(),
-        Some("time,body,name,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz,fx,fy,fz,tx,ty,tz")
-    );
+    assert_eq!(rows.next(), Some("time,body,name,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz,fx,fy,fz,tx,ty,tz"));
     assert_eq!(rows.clone().count(), 4);
-    assert!(
-        rows.all(|r| r.contains(",\"ball, red\",") && r.split(',').count() == 23),
-        "{bodies}"
-    );
+    assert!(rows.all(|r| r.contains(",\"ball, red\",") && r.split(',').count() == 23), "{bodies}");
 
     for extension in ["png", "ply", "vtk"] {
         for frame in 0..4 {
             let path = out.join(format!("frame_{frame:05}.{extension}"));
-            assert!(
-                std::fs::metadata(&path).is_ok_and(|m| m.len() > 1000),
-                "{path:?}"
-            );
+            assert!(std::fs::metadata(&path).is_ok_and(|m| m.len() > 1000), "{path:?}");
         }
     }
     let ply = text(&std::fs::read(out.join("frame_00003.ply")).unwrap());
@@ -190,34 +146,12 @@ fn a_run_is_quiet_in_a_pipe_and_repeats_to_the_last_bit() {
     let dir = folder("quiet");
     let file = scene(&dir, POOL);
     let hash = |threads: &str, out: &str| {
-        let run = jetsam(
-            &dir,
-            &[
-                "run",
-                &file,
-                "--save",
-                "csv",
-                "--threads",
-                threads,
-                "--out",
-                out,
-            ],
-        );
+        let run = jetsam(&dir, &["run", &file, "--save", "csv", "--threads", threads, "--out", out]);
         let message = text(&run.stderr);
         assert!(run.stdout.is_empty(), "{}", text(&run.stdout));
-        assert!(
-            message.lines().count() < 12 && !message.contains(['\r', '\u{1b}']),
-            "{message}"
-        );
-        let line = message
-            .lines()
-            .find(|l| l.starts_with("state hash"))
-            .unwrap()
-            .to_owned();
-        (
-            line,
-            std::fs::read(dir.join(out).join("bodies.csv")).unwrap(),
-        )
+        assert!(message.lines().count() < 12 && !message.contains(['\r', '\u{1b}']), "{message}");
+        let line = message.lines().find(|l| l.starts_with("state hash")).unwrap().to_owned();
+        (line, std::fs::read(dir.join(out).join("bodies.csv")).unwrap())
     };
     assert_eq!(hash("1", "one"), hash("3", "three"));
 }
@@ -227,15 +161,9 @@ fn the_last_frame_ends_with_the_run() {
     let dir = folder("lengths");
     let file = scene(&dir, POOL);
     let times = |args: &[&str]| -> Vec<f64> {
-        good(
-            &dir,
-            &[&["run", &file, "--save", "csv", "--out", "o"], args].concat(),
-        );
+        good(&dir, &[&["run", &file, "--save", "csv", "--out", "o"], args].concat());
         let stats = std::fs::read_to_string(dir.join("o/stats.jsonl")).unwrap();
-        stats
-            .lines()
-            .map(|l| json(l)["time"].as_f64().unwrap())
-            .collect()
+        stats.lines().map(|l| json(l)["time"].as_f64().unwrap()).collect()
     };
     assert_eq!(times(&["--seconds", "0.03"]), [0.0, 0.02, 0.03]);
     assert_eq!(times(&["--frames", "1"]), [0.0, 0.02]);
@@ -246,18 +174,12 @@ fn the_last_frame_ends_with_the_run() {
 fn too_many_lost_particles_are_status_1() {
     let dir = folder("lost");
     // a step a thousand times too long throws particles through the walls
-    let text_of = pool_with(
-        "[run]",
-        "[solver]\ndt = 0.02\ncourant = 1.0\ncourant_force = 1.0\nsound_speed = 900.0\n\n[run]",
-    );
+    let text_of =
+        pool_with("[run]", "[solver]\ndt = 0.02\ncourant = 1.0\ncourant_force = 1.0\nsound_speed = 900.0\n\n[run]");
     let file = scene(&dir, &text_of.replace("[[rigid]]", "[[fluid]]\nshape = { box = { min = [0.1, 0.1, 0.4], max = [0.3, 0.3, 0.6] } }\nvelocity = [90000.0, 0.0, 0.0]\n\n[[rigid]]"));
     let out = jetsam(&dir, &["run", &file, "--save", "csv", "--out", "o"]);
     assert_eq!(out.status.code(), Some(1), "{}", text(&out.stderr));
-    assert!(
-        text(&out.stderr).contains("help: "),
-        "{}",
-        text(&out.stderr)
-    );
+    assert!(text(&out.stderr).contains("help: "), "{}", text(&out.stderr));
 }
 
 #[test]
@@ -265,23 +187,8 @@ fn voxelize_says_what_the_contract_says() {
     let dir = folder("voxelize");
     let keys = "particles spacing triangles volume_mesh volume_particles com inertia watertight boundary_edges \
                 nonmanifold_edges flipped_shells rule millis backend";
-    for fineness in [
-        ["--particles", "500"],
-        ["--resolution", "12"],
-        ["--spacing", "0.09"],
-    ] {
-        let report = json(&good(
-            &dir,
-            &[
-                "voxelize",
-                &monkey(),
-                fineness[0],
-                fineness[1],
-                "--json",
-                "--out",
-                "m.ply",
-            ],
-        ));
+    for fineness in [["--particles", "500"], ["--resolution", "12"], ["--spacing", "0.09"]] {
+        let report = json(&good(&dir, &["voxelize", &monkey(), fineness[0], fineness[1], "--json", "--out", "m.ply"]));
         assert_keys(&report, keys);
         let header = format!("element vertex {}\n", report["particles"]);
         assert!(text(&std::fs::read(dir.join("m.ply")).unwrap()).contains(&header));
@@ -300,37 +207,13 @@ fn voxelize_says_what_the_contract_says() {
         "--json",
     ];
     let report = json(&good(&dir, &turned));
-    assert!(
-        (report["com"][0].as_f64().unwrap() + 1.0).abs() < 0.05,
-        "{report}"
-    );
+    assert!((report["com"][0].as_f64().unwrap() + 1.0).abs() < 0.05, "{report}");
     assert_eq!(report["rule"], "parity");
 
-    let series = good(
-        &dir,
-        &[
-            "voxelize",
-            &monkey(),
-            "--particles",
-            "40",
-            "--series",
-            "3",
-            "--out",
-            "s",
-            "--json",
-        ],
-    );
-    let counts: Vec<f64> = series
-        .lines()
-        .map(|l| json(l)["particles"].as_f64().unwrap())
-        .collect();
+    let series = good(&dir, &["voxelize", &monkey(), "--particles", "40", "--series", "3", "--out", "s", "--json"]);
+    let counts: Vec<f64> = series.lines().map(|l| json(l)["particles"].as_f64().unwrap()).collect();
     assert_eq!(counts.len(), 3);
-    assert!(
-        counts
-            .windows(2)
-            .all(|w| (1.8..2.2).contains(&(w[1] / w[0]))),
-        "{counts:?}"
-    );
+    assert!(counts.windows(2).all(|w| (1.8..2.2).contains(&(w[1] / w[0]))), "{counts:?}");
     assert!(dir.join("s/series_02.png").is_file());
 }
 
@@ -338,20 +221,7 @@ fn voxelize_says_what_the_contract_says() {
 fn bench_and_check_say_what_the_contract_says() {
     let dir = folder("bench");
     let file = scene(&dir, POOL);
-    let lines = good(
-        &dir,
-        &[
-            "bench",
-            &file,
-            "--particles",
-            "300",
-            "--particles",
-            "1500",
-            "--steps",
-            "5",
-            "--json",
-        ],
-    );
+    let lines = good(&dir, &["bench", &file, "--particles", "300", "--particles", "1500", "--steps", "5", "--json"]);
     let cases: Vec<Value> = lines.lines().map(json).collect();
     assert_eq!(cases.len(), 2);
     for (case, wanted) in cases.iter().zip([300.0, 1500.0]) {
@@ -359,37 +229,19 @@ fn bench_and_check_say_what_the_contract_says() {
             case,
             "scene backend device particles neighbours steps ms_per_step particle_steps_per_s real_time_factor",
         );
-        assert_keys(
-            case,
-            "density_error_mean peak_mb threads stage_ms state_hash",
-        );
-        assert_eq!(
-            (&case["steps"], &case["backend"]),
-            (&5.into(), &"cpu".into())
-        );
+        assert_keys(case, "density_error_mean peak_mb threads stage_ms state_hash");
+        assert_eq!((&case["steps"], &case["backend"]), (&5.into(), &"cpu".into()));
         let particles = case["particles"].as_f64().unwrap();
-        assert!(
-            (0.7..1.6).contains(&(particles / wanted)),
-            "{particles} for {wanted}"
-        );
-        assert!(
-            case["real_time_factor"].as_f64().unwrap() > 0.0
-                && case["peak_mb"].as_f64().unwrap() > 0.0
-        );
+        assert!((0.7..1.6).contains(&(particles / wanted)), "{particles} for {wanted}");
+        assert!(case["real_time_factor"].as_f64().unwrap() > 0.0 && case["peak_mb"].as_f64().unwrap() > 0.0);
     }
     assert!(good(&dir, &["bench", "--list"]).contains("dam-break"));
 
     let check = json(&good(&dir, &["check", &file, "--json"]));
-    assert_keys(
-        &check,
-        "fluid rigid_particles static_particles dt dt_bound sound_speed margins warnings",
-    );
+    assert_keys(&check, "fluid rigid_particles static_particles dt dt_bound sound_speed margins warnings");
     assert_eq!(check["fluid"], 500);
     for margin in check["margins"].as_array().unwrap() {
-        assert!(
-            margin["value"].as_f64().unwrap() <= 1.000_001 * margin["limit"].as_f64().unwrap(),
-            "{margin}"
-        );
+        assert!(margin["value"].as_f64().unwrap() <= 1.000_001 * margin["limit"].as_f64().unwrap(), "{margin}");
     }
     assert!(good(&dir, &["check", &file]).contains("time step"));
 }
@@ -404,12 +256,7 @@ fn the_schema_knows_every_key_of_the_built_in_scenes() {
         let name = scene["name"].as_str().unwrap();
         let path = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         let table: toml::Table = toml::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
-        accepts(
-            &schema,
-            &schema,
-            &serde_json::to_value(table).unwrap(),
-            name,
-        );
+        accepts(&schema, &schema, &serde_json::to_value(table).unwrap(), name);
     }
 }
 
@@ -424,9 +271,7 @@ fn accepts(root: &Value, schema: &Value, value: &Value, place: &str) {
         Value::Object(map) => {
             for (key, value) in map {
                 let named = |s: &Value| {
-                    let s = s["$ref"]
-                        .as_str()
-                        .map_or(s, |r| root.pointer(r.trim_start_matches('#')).unwrap());
+                    let s = s["$ref"].as_str().map_or(s, |r| root.pointer(r.trim_start_matches('#')).unwrap());
                     s["properties"].get(key).cloned()
                 };
                 let child = named(schema).or_else(|| alternatives?.iter().find_map(named));
@@ -438,9 +283,7 @@ fn accepts(root: &Value, schema: &Value, value: &Value, place: &str) {
                 );
             }
         }
-        Value::Array(items) => items
-            .iter()
-            .for_each(|item| accepts(root, &schema["items"], item, place)),
+        Value::Array(items) => items.iter().for_each(|item| accepts(root, &schema["items"], item, place)),
         _ => {}
     }
 }
@@ -469,11 +312,7 @@ fn wrong_values_are_named_with_line_and_remedy() {
     let water = "name = \"water\"";
     let ball = "density = 500";
     let shape = "shape = { sphere = { center = [0.0, 0.0, 0.0], radius = 0.1 } }";
-    check(
-        water,
-        "name = \"water\"\nviscosty = 1",
-        &["scene.toml:15", "did you mean `viscosity`"],
-    );
+    check(water, "name = \"water\"\nviscosty = 1", &["scene.toml:15", "did you mean `viscosity`"]);
     check(water, "density = -3", &["scene.toml:14", "-3"]);
     check(ball, "density = -500", &["scene.toml:20", "-500"]);
     check(ball, "density = nan", &["scene.toml:20"]);
@@ -481,54 +320,18 @@ fn wrong_values_are_named_with_line_and_remedy() {
     check("spacing = 0.05", "spacing = 1e-6", &["scene.toml:8", "GB"]);
     check("spacing = 0.05", "spacing = 0", &["scene.toml:8"]);
     check("spacing = 0.05", "spacing = 50", &["help: "]);
-    check(
-        "0.25, 0.25, 0.5",
-        "0.25, 0.25, 0.75",
-        &["scene.toml:21", "outside the domain"],
-    );
+    check("0.25, 0.25, 0.5", "0.25, 0.25, 0.75", &["scene.toml:21", "outside the domain"]);
     check("0.25, 0.25, 0.5", "1e300, 0, 0", &["scene.toml:21"]);
-    check(
-        "max = [0.5, 0.5, 0.8]",
-        "max = [0.5, -0.5, 0.8]",
-        &["scene.toml:5"],
-    );
-    check(
-        "max = [0.5, 0.5, 0.8]",
-        "max = [0.5, 1e30, 0.8]",
-        &["help: "],
-    );
+    check("max = [0.5, 0.5, 0.8]", "max = [0.5, -0.5, 0.8]", &["scene.toml:5"]);
+    check("max = [0.5, 0.5, 0.8]", "max = [0.5, 1e30, 0.8]", &["help: "]);
     check("radius = 0.1", "radius = -0.1", &["scene.toml:19"]);
-    check(
-        "max = [0.5, 0.5, 0.25]",
-        "max = [0.5, 0.5, -0.25]",
-        &["scene.toml:15"],
-    );
-    check(
-        shape,
-        "shape = { mesh = { path = \"gone.obj\" } }",
-        &["scene.toml:19", "gone.obj"],
-    );
-    std::fs::write(
-        dir.join("broken.obj"),
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
-    )
-    .unwrap();
-    check(
-        shape,
-        "shape = { mesh = { path = \"broken.obj\" } }",
-        &["scene.toml:19", "broken.obj"],
-    );
+    check("max = [0.5, 0.5, 0.25]", "max = [0.5, 0.5, -0.25]", &["scene.toml:15"]);
+    check(shape, "shape = { mesh = { path = \"gone.obj\" } }", &["scene.toml:19", "gone.obj"]);
+    std::fs::write(dir.join("broken.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n").unwrap();
+    check(shape, "shape = { mesh = { path = \"broken.obj\" } }", &["scene.toml:19", "broken.obj"]);
     std::fs::write(dir.join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
-    check(
-        shape,
-        "shape = { mesh = { path = \"flat.obj\", scale = 0.1 } }",
-        &["scene.toml:19", "flat.obj"],
-    );
-    check(
-        shape,
-        "shape = { mesh = { path = \"flat.obj\", scale = 1e12 } }",
-        &["scene.toml:19"],
-    );
+    check(shape, "shape = { mesh = { path = \"flat.obj\", scale = 0.1 } }", &["scene.toml:19", "flat.obj"]);
+    check(shape, "shape = { mesh = { path = \"flat.obj\", scale = 1e12 } }", &["scene.toml:19"]);
     check(
         ball,
         "density = 500\ncopies = { count = 4000000000, grid = { columns = [1, 1], step = [0, 0, 0.1] } }",
@@ -539,11 +342,7 @@ fn wrong_values_are_named_with_line_and_remedy() {
         "density = 500\ncopies = { count = 50, random = { min = [0, 0, 0.3], max = [0.5, 0.5, 0.8] } }",
         &["scene.toml", "copies fit"],
     );
-    check(
-        ball,
-        "density = 500\ncopies = { count = 2 }",
-        &["scene.toml", "grid"],
-    );
+    check(ball, "density = 500\ncopies = { count = 2 }", &["scene.toml", "grid"]);
     check("[run]", "[run]\nframes_per_second = 0", &["scene.toml:11"]);
     check("[run]", "[world]\ndimensions = 4\n[run]", &["dimensions"]);
 }
@@ -552,69 +351,22 @@ fn wrong_values_are_named_with_line_and_remedy() {
 fn wrong_arguments_are_status_2() {
     let dir = folder("arguments");
     let file = scene(&dir, POOL);
-    bad(
-        &dir,
-        &["run", &file, "--set", "solver.supprt=2"],
-        &["did you mean `support`"],
-    );
-    bad(
-        &dir,
-        &["run", &file, "--set", "nonsense"],
-        &["--set key=value"],
-    );
-    bad(
-        &dir,
-        &["run", &file, "--set", "rigid.7.density=3"],
-        &["help: "],
-    );
-    bad(
-        &dir,
-        &["run", &file, "--set", "fluid.0.density=heavy"],
-        &["help: "],
-    );
-    bad(
-        &dir,
-        &["run", &file, "--set", "fluid.0.density=-1"],
-        &["help: "],
-    );
+    bad(&dir, &["run", &file, "--set", "solver.supprt=2"], &["did you mean `support`"]);
+    bad(&dir, &["run", &file, "--set", "nonsense"], &["--set key=value"]);
+    bad(&dir, &["run", &file, "--set", "rigid.7.density=3"], &["help: "]);
+    bad(&dir, &["run", &file, "--set", "fluid.0.density=heavy"], &["help: "]);
+    bad(&dir, &["run", &file, "--set", "fluid.0.density=-1"], &["help: "]);
     bad(&dir, &["run", &file, "--backend", "gpu"], &["gpu"]);
     bad(&dir, &["run", &file, "--save", "gif"], &["gif"]);
     bad(&dir, &["run", &file, "--seconds", "-1"], &["seconds"]);
     bad(&dir, &["run", &file, "--threads", "0"], &["threads"]);
-    bad(
-        &dir,
-        &["run", &file, "--out", &format!("{file}/below")],
-        &["scene.toml", "help: "],
-    );
+    bad(&dir, &["run", &file, "--out", &format!("{file}/below")], &["scene.toml", "help: "]);
     bad(&dir, &["frobnicate"], &["frobnicate"]);
     bad(&dir, &["voxelize", &monkey()], &["--spacing"]);
-    bad(
-        &dir,
-        &["voxelize", &monkey(), "--spacing", "-1"],
-        &["spacing"],
-    );
-    bad(
-        &dir,
-        &["voxelize", &monkey(), "--spacing", "1e-9"],
-        &["cells"],
-    );
-    bad(
-        &dir,
-        &["voxelize", "gone.stl", "--particles", "10"],
-        &["gone.stl", "help: "],
-    );
-    bad(
-        &dir,
-        &[
-            "voxelize",
-            &monkey(),
-            "--particles",
-            "10",
-            "--out",
-            "no/folder/m.ply",
-        ],
-        &["help: "],
-    );
+    bad(&dir, &["voxelize", &monkey(), "--spacing", "-1"], &["spacing"]);
+    bad(&dir, &["voxelize", &monkey(), "--spacing", "1e-9"], &["cells"]);
+    bad(&dir, &["voxelize", "gone.stl", "--particles", "10"], &["gone.stl", "help: "]);
+    bad(&dir, &["voxelize", &monkey(), "--particles", "10", "--out", "no/folder/m.ply"], &["help: "]);
     bad(&dir, &["bench", "nowhere.toml"], &["nowhere.toml"]);
 }
 
@@ -623,18 +375,9 @@ fn a_video_without_ffmpeg_is_status_2() {
     let dir = folder("video");
     let file = scene(&dir, POOL);
     let args = ["run", &file, "--save", "mp4", "--out", "o"];
-    let out = Command::new(env!("CARGO_BIN_EXE_jetsam"))
-        .args(args)
-        .current_dir(&dir)
-        .env("PATH", "")
-        .output()
-        .unwrap();
+    let out = Command::new(env!("CARGO_BIN_EXE_jetsam")).args(args).current_dir(&dir).env("PATH", "").output().unwrap();
     assert_eq!(out.status.code(), Some(2));
-    assert!(
-        text(&out.stderr).contains("install ffmpeg"),
-        "{}",
-        text(&out.stderr)
-    );
+    assert!(text(&out.stderr).contains("install ffmpeg"), "{}", text(&out.stderr));
 }
 
 #[test]
@@ -643,35 +386,17 @@ fn fluid_gives_way_to_bodies_and_says_so() {
     let file = scene(&dir, &pool_with("0.25, 0.25, 0.5", "0.25, 0.25, 0.12"));
     let check = json(&good(&dir, &["check", &file, "--json"]));
     assert!(check["fluid"].as_u64().unwrap() < 500);
-    assert!(
-        check["warnings"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .any(|w| w.as_str().unwrap().contains("carved")),
-        "{check}"
-    );
-    let run = jetsam(
-        &dir,
-        &["run", &file, "--frames", "1", "--save", "csv", "--out", "o"],
-    );
-    assert!(
-        text(&run.stderr).starts_with("warning: "),
-        "{}",
-        text(&run.stderr)
-    );
+    assert!(check["warnings"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains("carved")), "{check}");
+    let run = jetsam(&dir, &["run", &file, "--frames", "1", "--save", "csv", "--out", "o"]);
+    assert!(text(&run.stderr).starts_with("warning: "), "{}", text(&run.stderr));
 }
 
 #[test]
 fn scenes_of_other_kinds_run_too() {
     let dir = folder("kinds");
     let flat = pool_with("[domain]", "[world]\ndimensions = 2\n\n[domain]");
-    let dry = POOL[..POOL.find("[[fluid]]").unwrap()].to_owned()
-        + &POOL[POOL.find("[[rigid]]").unwrap()..];
-    let open = pool_with(
-        "[resolution]",
-        "walls = [\"periodic\", \"open\", \"solid\"]\n\n[resolution]",
-    );
+    let dry = POOL[..POOL.find("[[fluid]]").unwrap()].to_owned() + &POOL[POOL.find("[[rigid]]").unwrap()..];
+    let open = pool_with("[resolution]", "walls = [\"periodic\", \"open\", \"solid\"]\n\n[resolution]");
     let settled = pool_with("[run]", "[solver]\nsettle = 0.01\n\n[run]");
     let still = pool_with("[domain]", "[world]\ngravity = [0, 0, 0]\n\n[domain]");
     for text in [flat, dry, open, settled, still] {

@@ -21,31 +21,18 @@ impl Camera {
     pub fn framing(min: Vec3, max: Vec3, from: Vec3, fov_y: f32, aspect: f32) -> Camera {
         let target = 0.5 * (min + max);
         let back = from.try_normalize().unwrap_or(Vec3::NEG_Y);
-        let up = if back.truncate().length() > 1e-3 {
-            Vec3::Z
-        } else {
-            Vec3::Y
-        };
-        let camera = Camera {
-            eye: target + back,
-            target,
-            up,
-            fov_y,
-        };
+        let up = if back.truncate().length() > 1e-3 { Vec3::Z } else { Vec3::Y };
+        let camera = Camera { eye: target + back, target, up, fov_y };
         let view = View::new(&camera, 2.0, 2.0);
         let tangent = vec2(aspect, 1.0) * (0.5 * fov_y).tan();
         let distance = (0..8)
             .map(|corner| {
-                let pick =
-                    Vec3::from_array([1, 2, 4].map(|bit| ((corner & bit) != 0) as u8 as f32));
+                let pick = Vec3::from_array([1, 2, 4].map(|bit| ((corner & bit) != 0) as u8 as f32));
                 let p = view.local(min + pick * (max - min)) - Vec3::Z;
                 (p.truncate().abs() / tangent).max_element() - p.z
             })
             .fold(0.0, f32::max);
-        Camera {
-            eye: target + back * distance.max(1e-3),
-            ..camera
-        }
+        Camera { eye: target + back * distance.max(1e-3), ..camera }
     }
 
     /// Where the point (m) appears in a picture of `width` by `height` pixels: column, row (from the top left corner) and depth along
@@ -70,13 +57,8 @@ pub(crate) struct View {
 
 impl View {
     pub fn new(camera: &Camera, width: f32, height: f32) -> View {
-        let forward = (camera.target - camera.eye)
-            .try_normalize()
-            .unwrap_or(Vec3::Y);
-        let right = forward
-            .cross(camera.up)
-            .try_normalize()
-            .unwrap_or_else(|| forward.any_orthonormal_vector());
+        let forward = (camera.target - camera.eye).try_normalize().unwrap_or(Vec3::Y);
+        let right = forward.cross(camera.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
         View {
             eye: camera.eye,
             right,
@@ -122,16 +104,9 @@ mod tests {
             for corner in 0..8 {
                 let pick = Vec3::from_array([1, 2, 4].map(|bit| f32::from(corner & bit != 0)));
                 let p = camera.project(min + pick * (max - min), 300, 200).unwrap();
-                reach = reach.max(
-                    (p.truncate() / vec2(150.0, 100.0) - 1.0)
-                        .abs()
-                        .max_element(),
-                );
+                reach = reach.max((p.truncate() / vec2(150.0, 100.0) - 1.0).abs().max_element());
             }
-            assert!(
-                (reach - 1.0).abs() < 1e-4,
-                "corners reach {reach} of the way to the edge seen from {from}"
-            );
+            assert!((reach - 1.0).abs() < 1e-4, "corners reach {reach} of the way to the edge seen from {from}");
         }
     }
 }

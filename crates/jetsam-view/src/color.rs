@@ -32,16 +32,11 @@ pub fn water(t: f32) -> [f32; 3] {
 /// differ most from their neighbours.
 pub fn of_name(name: &str) -> [f32; 3] {
     let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
-    let number = name[stem.len()..].bytes().fold(0u32, |n, digit| {
-        n.wrapping_mul(10).wrapping_add((digit - b'0').into())
-    });
-    let hash = stem.bytes().fold(0x811c_9dc5u32, |h, byte| {
-        (h ^ u32::from(byte)).wrapping_mul(0x0100_0193)
-    }); // FNV-1a
+    let number =
+        name[stem.len()..].bytes().fold(0u32, |n, digit| n.wrapping_mul(10).wrapping_add((digit - b'0').into()));
+    let hash = stem.bytes().fold(0x811c_9dc5u32, |h, byte| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193)); // FNV-1a
     // Fractions of 2^32; the multiplication is by the golden ratio, the remainder wraps.
-    let turn = hash
-        .wrapping_mul(0x9e37_79b1)
-        .wrapping_add(number.wrapping_mul(0x9e37_79b9));
+    let turn = hash.wrapping_mul(0x9e37_79b1).wrapping_add(number.wrapping_mul(0x9e37_79b9));
     let t = (turn >> 8) as f32 / (1 << 24) as f32;
     // From pink through red, orange and yellow to green; every other number a little darker, yellow lighter lest it be olive.
     let h = -0.08 + 0.50 * t;
@@ -52,15 +47,9 @@ pub fn of_name(name: &str) -> [f32; 3] {
 /// The byte that shows a linear value of `x` / 4096 for each index `x`, by the sRGB transfer function.
 pub(crate) fn srgb_table() -> Vec<u8> {
     let encode = |x: f32| {
-        if x <= 0.003_130_8 {
-            12.92 * x
-        } else {
-            1.055 * x.powf(1.0 / 2.4) - 0.055
-        }
+        if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
     };
-    (0..=4096)
-        .map(|x| (255.0 * encode(x as f32 / 4096.0) + 0.5) as u8)
-        .collect()
+    (0..=4096).map(|x| (255.0 * encode(x as f32 / 4096.0) + 0.5) as u8).collect()
 }
 
 #[cfg(test)]
@@ -74,9 +63,7 @@ mod tests {
 
     #[test]
     fn water_grows_lighter_with_speed() {
-        let y: Vec<f32> = (0..=100)
-            .map(|i| luminance(water(i as f32 / 100.0)))
-            .collect();
+        let y: Vec<f32> = (0..=100).map(|i| luminance(water(i as f32 / 100.0))).collect();
         assert!(y.windows(2).all(|pair| pair[0] < pair[1]), "{y:?}");
         assert_eq!(water(f32::NAN), water(0.0));
         assert_eq!(water(7.0), water(1.0));

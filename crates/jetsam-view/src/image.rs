@@ -36,10 +36,7 @@ impl Image {
     /// Writes the picture as a PNG file; its folder must exist.
     pub fn save_png(&self, path: impl AsRef<Path>) -> Result<(), ImageError> {
         let path = path.as_ref();
-        self.write_png(path).map_err(|source| ImageError {
-            path: path.into(),
-            source,
-        })
+        self.write_png(path).map_err(|source| ImageError { path: path.into(), source })
     }
 
     fn write_png(&self, path: &Path) -> Result<(), png::EncodingError> {

@@ -70,18 +70,10 @@ impl Raster {
         let size = [width, height];
         let view = View::new(camera, width as f32, height as f32);
         let first = balls.len();
-        let round = balls
-            .par_iter()
-            .enumerate()
-            .filter_map(|(i, ball)| Splat::ball(ball, i, &view, size));
-        let flat = facets
-            .par_iter()
-            .enumerate()
-            .filter_map(|(i, facet)| Splat::facet(facet, first + i, &view, size));
+        let round = balls.par_iter().enumerate().filter_map(|(i, ball)| Splat::ball(ball, i, &view, size));
+        let flat = facets.par_iter().enumerate().filter_map(|(i, facet)| Splat::facet(facet, first + i, &view, size));
         let mut splats: Vec<Splat> = round.chain(flat).collect();
-        splats.par_sort_unstable_by(|a, b| {
-            a.nearest.total_cmp(&b.nearest).then(a.index.cmp(&b.index))
-        });
+        splats.par_sort_unstable_by(|a, b| a.nearest.total_cmp(&b.nearest).then(a.index.cmp(&b.index)));
 
         // Counting sort of (tile, splat) pairs by tile: front to back within each.
         let (across, down) = (width.div_ceil(TILE), height.div_ceil(TILE));
@@ -91,10 +83,7 @@ impl Raster {
             rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
         };
         let mut ends = vec![0usize; across * down + 1];
-        splats
-            .iter()
-            .flat_map(touched)
-            .for_each(|tile| ends[tile + 1] += 1);
+        splats.iter().flat_map(touched).for_each(|tile| ends[tile + 1] += 1);
         (1..ends.len()).for_each(|tile| ends[tile] += ends[tile - 1]);
         let mut list = vec![0u32; ends[across * down]];
         let mut next = ends.clone();
@@ -107,31 +96,12 @@ impl Raster {
 
         let samples = across * down * TILE * TILE;
         let (mut depth, mut shows) = (vec![f32::INFINITY; samples], vec![NOTHING; samples]);
-        let tiles = depth
-            .par_chunks_mut(TILE * TILE)
-            .zip(shows.par_chunks_mut(TILE * TILE));
-        tiles
-            .with_max_len(1)
-            .enumerate()
-            .for_each(|(t, (depth, shows))| {
-                let splats = list[ends[t]..ends[t + 1]]
-                    .iter()
-                    .map(|i| &splats[*i as usize]);
-                Tile { depth, shows }.draw(
-                    splats,
-                    &view,
-                    [t % across * TILE, t / across * TILE],
-                    ground,
-                );
-            });
-        Raster {
-            view,
-            width,
-            height,
-            across,
-            depth,
-            shows,
-        }
+        let tiles = depth.par_chunks_mut(TILE * TILE).zip(shows.par_chunks_mut(TILE * TILE));
+        tiles.with_max_len(1).enumerate().for_each(|(t, (depth, shows))| {
+            let splats = list[ends[t]..ends[t + 1]].iter().map(|i| &splats[*i as usize]);
+            Tile { depth, shows }.draw(splats, &view, [t % across * TILE, t / across * TILE], ground);
+        });
+        Raster { view, width, height, across, depth, shows }
     }
 
     fn index(&self, x: usize, y: usize) -> usize {
@@ -148,11 +118,7 @@ impl Raster {
     #[inline]
     pub fn depth(&self, p: IVec2) -> f32 {
         let (x, y) = (p.x as usize, p.y as usize); // a negative one becomes huge
-        if x < self.width && y < self.height {
-            self.depth[self.index(x, y)]
-        } else {
-            f32::INFINITY
-        }
+        if x < self.width && y < self.height { self.depth[self.index(x, y)] } else { f32::INFINITY }
     }
 }
 
@@ -167,19 +133,8 @@ impl Splat {
         let square = (c.z - r) * (c.z + r);
         let reach = |x: f32| r * (x * x + square).sqrt() / square;
         let (middle, reach) = (c.truncate() * c.z / square, vec2(reach(c.x), reach(c.y)));
-        let shape = Shape::Ball {
-            center: c,
-            radius: r,
-        };
-        Splat::new(
-            shape,
-            index,
-            c.z - r,
-            middle - reach,
-            middle + reach,
-            view,
-            size,
-        )
+        let shape = Shape::Ball { center: c, radius: r };
+        Splat::new(shape, index, c.z - r, middle - reach, middle + reach, view, size)
     }
 
     /// None for a facet that cannot be seen or reaches behind the eye.
@@ -194,19 +149,8 @@ impl Splat {
         if (b - a).perp_dot(c - a) < 0.0 {
             corners.swap(1, 2);
         }
-        let shape = Shape::Facet {
-            corners: corners.map(slope),
-            nearness: corners.map(|p| 1.0 / p.z),
-        };
-        Splat::new(
-            shape,
-            index,
-            nearest,
-            a.min(b).min(c),
-            a.max(b).max(c),
-            view,
-            size,
-        )
+        let shape = Shape::Facet { corners: corners.map(slope), nearness: corners.map(|p| 1.0 / p.z) };
+        Splat::new(shape, index, nearest, a.min(b).min(c), a.max(b).max(c), view, size)
     }
 
     /// A shape seen between the slopes `low` and `high`; None when no sample lies there.
@@ -221,36 +165,18 @@ impl Splat {
     ) -> Option<Splat> {
         // Samples lie in the middle of raster cells; upward is towards lower rows.
         let cut = |p: f32, size: usize| (p + 0.5).clamp(0.0, size as f32) as usize;
-        let (left, right) = (
-            view.middle.x + low.x * view.focal,
-            view.middle.x + high.x * view.focal,
-        );
-        let (top, bottom) = (
-            view.middle.y - high.y * view.focal,
-            view.middle.y - low.y * view.focal,
-        );
+        let (left, right) = (view.middle.x + low.x * view.focal, view.middle.x + high.x * view.focal);
+        let (top, bottom) = (view.middle.y - high.y * view.focal, view.middle.y - low.y * view.focal);
         let columns = cut(left, size[0])..cut(right, size[0]);
         let rows = cut(top, size[1])..cut(bottom, size[1]);
         let seen = !columns.is_empty() && !rows.is_empty();
-        seen.then_some(Splat {
-            shape,
-            index: index as u32,
-            nearest,
-            columns,
-            rows,
-        })
+        seen.then_some(Splat { shape, index: index as u32, nearest, columns, rows })
     }
 }
 
 impl Tile<'_> {
     /// Draws the splats, which come front to back, into the tile whose first sample is `corner`.
-    fn draw<'a>(
-        self,
-        splats: impl Iterator<Item = &'a Splat>,
-        view: &View,
-        corner: [usize; 2],
-        ground: Option<f32>,
-    ) {
+    fn draw<'a>(self, splats: impl Iterator<Item = &'a Splat>, view: &View, corner: [usize; 2], ground: Option<f32>) {
         let middle = |k: usize, i: usize| (corner[k] + i) as f32 + 0.5;
         let slope_x: [f32; TILE] = std::array::from_fn(|x| view.slope(vec2(middle(0, x), 0.0)).x);
         let slope_y: [f32; TILE] = std::array::from_fn(|y| view.slope(vec2(0.0, middle(1, y))).y);
@@ -265,18 +191,10 @@ impl Tile<'_> {
 
         for (count, splat) in splats.enumerate() {
             // Now and then: is the tile full, and nearer than all that comes?
-            if count % 32 == 31
-                && self
-                    .depth
-                    .iter()
-                    .fold(0.0f32, |most, depth| most.max(*depth))
-                    < splat.nearest
-            {
+            if count % 32 == 31 && self.depth.iter().fold(0.0f32, |most, depth| most.max(*depth)) < splat.nearest {
                 break;
             }
-            let within = |range: &Range<usize>, from: usize| {
-                range.start.max(from) - from..(range.end - from).min(TILE)
-            };
+            let within = |range: &Range<usize>, from: usize| range.start.max(from) - from..(range.end - from).min(TILE);
             let columns = within(&splat.columns, corner[0]);
             let sx = &slope_x[columns.clone()];
             for y in within(&splat.rows, corner[1]) {
@@ -284,14 +202,10 @@ impl Tile<'_> {
                 let (depth, shows) = (&mut self.depth[row.clone()], &mut self.shows[row]);
                 match splat.shape {
                     Shape::Ball { center, radius } => {
-                        draw(depth, shows, sx, splat.index, |x| {
-                            ball_depth(center, radius, x, slope_y[y])
-                        });
+                        draw(depth, shows, sx, splat.index, |x| ball_depth(center, radius, x, slope_y[y]));
                     }
                     Shape::Facet { corners, nearness } => {
-                        draw(depth, shows, sx, splat.index, |x| {
-                            facet_depth(corners, nearness, x, slope_y[y])
-                        });
+                        draw(depth, shows, sx, splat.index, |x| facet_depth(corners, nearness, x, slope_y[y]));
                     }
                 }
             }
@@ -320,11 +234,7 @@ fn ball_depth(c: Vec3, radius: f32, x: f32, y: f32) -> f32 {
     let closest = (x * c.x + y * c.y + c.z) * square;
     let miss = Vec3::new(c.x - closest * x, c.y - closest * y, c.z - closest);
     let half = (radius * radius - (miss.x * miss.x + miss.y * miss.y + miss.z * miss.z)) * square;
-    if half > 0.0 {
-        closest - half.sqrt()
-    } else {
-        f32::INFINITY
-    }
+    if half > 0.0 { closest - half.sqrt() } else { f32::INFINITY }
 }
 
 /// Depth at which the line of sight t (x, y, 1) meets a facet: 1 / depth is linear in the slopes.
@@ -335,9 +245,5 @@ fn facet_depth(p: [Vec2; 3], nearness: [f32; 3], x: f32, y: f32) -> f32 {
     let area = a + b + c;
     // Neighbours overlap by a hair: no light through the seams.
     let inside = a.min(b).min(c) >= -1e-5 * area;
-    if inside && area > 0.0 {
-        area / (a * nearness[0] + b * nearness[1] + c * nearness[2])
-    } else {
-        f32::INFINITY
-    }
+    if inside && area > 0.0 { area / (a * nearness[0] + b * nearness[1] + c * nearness[2]) } else { f32::INFINITY }
 }

@@ -42,24 +42,14 @@ pub fn facets(vertices: &[Vec3], triangles: &[[u32; 3]], color: [f32; 3]) -> Vec
     let across = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
     let mut smooth = vec![Vec3::ZERO; vertices.len()];
     for triangle in triangles {
-        triangle
-            .iter()
-            .for_each(|v| smooth[*v as usize] += across(corners(triangle)));
+        triangle.iter().for_each(|v| smooth[*v as usize] += across(corners(triangle)));
     }
     let facet = |triangle: &[u32; 3]| {
         let flat = across(corners(triangle));
         let normal = |v: u32| {
-            if smooth[v as usize].angle_between(flat) < 1.05 {
-                smooth[v as usize]
-            } else {
-                flat
-            }
+            if smooth[v as usize].angle_between(flat) < 1.05 { smooth[v as usize] } else { flat }
         };
-        Facet {
-            corners: corners(triangle),
-            normals: triangle.map(|v| normal(v).normalize_or_zero()),
-            color,
-        }
+        Facet { corners: corners(triangle), normals: triangle.map(|v| normal(v).normalize_or_zero()), color }
     };
     triangles.iter().map(facet).collect()
 }
@@ -73,11 +63,7 @@ impl Facet {
         let [l, m, n] = self.normals;
         let normal = (share(b, c) * l + share(c, a) * m + share(a, b) * n).try_normalize();
         let normal = normal.unwrap_or_else(|| across.normalize_or(back));
-        if across.dot(back) < 0.0 {
-            -normal
-        } else {
-            normal
-        }
+        if across.dot(back) < 0.0 { -normal } else { normal }
     }
 }
 
@@ -124,49 +110,29 @@ impl Default for Options<'_> {
 
 /// The twelve edges of the box from `min` to `max` (m).
 pub fn box_edges(min: Vec3, max: Vec3, color: [f32; 3]) -> [Line; 12] {
-    let corner = |i: usize| {
-        Vec3::from_array(std::array::from_fn(|k| {
-            if i >> k & 1 == 0 { min[k] } else { max[k] }
-        }))
-    };
+    let corner = |i: usize| Vec3::from_array(std::array::from_fn(|k| if i >> k & 1 == 0 { min[k] } else { max[k] }));
     std::array::from_fn(|edge| {
         let (axis, others) = (edge / 4, edge % 4);
         let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
         let from = (others & 1) << j | (others >> 1) << k;
-        Line {
-            from: corner(from),
-            to: corner(from | 1 << axis),
-            color,
-        }
+        Line { from: corner(from), to: corner(from | 1 << axis), color }
     })
 }
 
 /// Draws the balls into a picture of `width` by `height` pixels. The result is the same, bit for bit, for any number of threads.
-pub fn render(
-    balls: &[Ball],
-    camera: &Camera,
-    width: usize,
-    height: usize,
-    options: &Options,
-) -> Image {
+pub fn render(balls: &[Ball], camera: &Camera, width: usize, height: usize, options: &Options) -> Image {
     let scene = Scene::new(balls, camera, width, height, options);
     let srgb = color::srgb_table();
     let mut rgba = vec![255; width * height * 4];
-    rgba.par_chunks_mut((width * 4).max(1))
-        .enumerate()
-        .for_each(|(y, row)| {
-            for (x, pixel) in row.chunks_exact_mut(4).enumerate() {
-                let linear = scene.shade(x, y).clamp(Vec3::ZERO, Vec3::ONE);
-                for k in 0..3 {
-                    pixel[k] = srgb[(linear[k] * 4096.0 + 0.5) as usize];
-                }
+    rgba.par_chunks_mut((width * 4).max(1)).enumerate().for_each(|(y, row)| {
+        for (x, pixel) in row.chunks_exact_mut(4).enumerate() {
+            let linear = scene.shade(x, y).clamp(Vec3::ZERO, Vec3::ONE);
+            for k in 0..3 {
+                pixel[k] = srgb[(linear[k] * 4096.0 + 0.5) as usize];
             }
-        });
-    let mut image = Image {
-        width,
-        height,
-        rgba,
-    };
+        }
+    });
+    let mut image = Image { width, height, rgba };
     for line in options.lines {
         scene.draw(line, &srgb, &mut image);
     }
@@ -193,57 +159,27 @@ struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    fn new(
-        balls: &'a [Ball],
-        camera: &Camera,
-        width: usize,
-        height: usize,
-        options: &'a Options<'a>,
-    ) -> Scene<'a> {
+    fn new(balls: &'a [Ball], camera: &Camera, width: usize, height: usize, options: &'a Options<'a>) -> Scene<'a> {
         let facets = options.facets;
-        let sound = || {
-            balls
-                .iter()
-                .filter(|ball| ball.center.is_finite() && ball.radius.is_finite())
-        };
-        let corners = facets
-            .iter()
-            .flat_map(|facet| facet.corners)
-            .filter(|p| p.is_finite());
-        let tips = sound()
-            .flat_map(|ball| [ball.center - ball.radius, ball.center + ball.radius])
-            .chain(corners);
+        let sound = || balls.iter().filter(|ball| ball.center.is_finite() && ball.radius.is_finite());
+        let corners = facets.iter().flat_map(|facet| facet.corners).filter(|p| p.is_finite());
+        let tips = sound().flat_map(|ball| [ball.center - ball.radius, ball.center + ball.radius]).chain(corners);
         // A particle lost at the end of the world must not cost the others their shadows.
         let far = 2.0 * camera.eye.distance(camera.target);
         let tips = tips.filter(|p| p.distance(camera.target) < far);
         let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let (low, high) = tips.fold(empty, |(low, high), p| (low.min(p), high.max(p)));
-        let (low, high) = if low.is_finite() {
-            (low, high)
-        } else {
-            (Vec3::ZERO, Vec3::ONE)
-        };
+        let (low, high) = if low.is_finite() { (low, high) } else { (Vec3::ZERO, Vec3::ONE) };
         let light = options.light.try_normalize().unwrap_or(Vec3::Z);
         let lamp = Camera::framing(low, high, light, 0.2, 1.0);
         let mean_radius = sound().map(|ball| ball.radius).sum::<f32>() / sound().count() as f32;
         Scene {
             balls,
             options,
-            seen: Raster::new(
-                balls,
-                facets,
-                options.ground,
-                camera,
-                width * FINE,
-                height * FINE,
-            ),
+            seen: Raster::new(balls, facets, options.ground, camera, width * FINE, height * FINE),
             lit: Raster::new(balls, facets, None, &lamp, LIGHT, LIGHT),
             light,
-            grain: if mean_radius > 0.0 {
-                mean_radius
-            } else {
-                0.01 * (high - low).length()
-            },
+            grain: if mean_radius > 0.0 { mean_radius } else { 0.01 * (high - low).length() },
             shadow_taps: spiral(),
             sky_taps: spiral(),
         }
@@ -281,9 +217,7 @@ impl<'a> Scene<'a> {
         let point = view.eye + depth * ray;
         if shows == GROUND {
             let open = self.openness(place, depth, Vec3::Z, self.grain);
-            return background
-                * (0.35 + 0.65 * open)
-                * (0.55 + 0.45 * self.sunshine(point, self.grain));
+            return background * (0.35 + 0.65 * open) * (0.55 + 0.45 * self.sunshine(point, self.grain));
         }
 
         let (normal, grain, color) = match self.balls.get(shows as usize) {
@@ -293,13 +227,9 @@ impl<'a> Scene<'a> {
                 (facet.normal(point, -ray), self.grain, facet.color)
             }
         };
-        let (open, sun) = (
-            self.openness(place, depth, normal, grain),
-            self.sunshine(point, grain),
-        );
+        let (open, sun) = (self.openness(place, depth, normal, grain), self.sunshine(point, grain));
         let facing = normal.dot(self.light).max(0.0);
-        let sky =
-            Vec3::new(0.30, 0.29, 0.28).lerp(Vec3::new(0.50, 0.54, 0.60), 0.5 + 0.5 * normal.z);
+        let sky = Vec3::new(0.30, 0.29, 0.28).lerp(Vec3::new(0.50, 0.54, 0.60), 0.5 + 0.5 * normal.z);
         let sunlight = Vec3::new(1.0, 0.96, 0.90) * (0.80 * facing * sun);
         let halfway = (self.light - ray.normalize()).normalize_or_zero();
         let gloss = 0.10 * normal.dot(halfway).max(0.0).powi(32) * sun;
@@ -312,13 +242,8 @@ impl<'a> Scene<'a> {
         let local = view.local(point);
         let (middle, reach) = (view.pixel(local), 2.0 * grain * view.focal / local.z);
         // Shapes shade what lies two radii behind them: a surface of balls does not shade itself.
-        let free =
-            |tap: &Vec2| self.lit.depth((middle + reach * *tap).as_ivec2()) > local.z - 2.0 * grain;
-        let count: u32 = self
-            .shadow_taps
-            .iter()
-            .map(|tap| u32::from(free(tap)))
-            .sum();
+        let free = |tap: &Vec2| self.lit.depth((middle + reach * *tap).as_ivec2()) > local.z - 2.0 * grain;
+        let count: u32 = self.shadow_taps.iter().map(|tap| u32::from(free(tap))).sum();
         count as f32 / self.shadow_taps.len() as f32
     }
 
@@ -329,11 +254,7 @@ impl<'a> Scene<'a> {
         let reach = (range * view.focal / depth).min(96.0);
         let mut blocked = 0.0;
         let origin = (depth * view.slope(place)).extend(depth);
-        let normal = Vec3::new(
-            normal.dot(view.right),
-            normal.dot(view.up),
-            normal.dot(view.forward),
-        );
+        let normal = Vec3::new(normal.dot(view.right), normal.dot(view.up), normal.dot(view.forward));
         for tap in self.sky_taps {
             // Without branches, which would be mispredicted: an infinite depth comes to a fade of nought.
             let tap = (place + reach * tap).as_ivec2();
@@ -365,36 +286,18 @@ impl<'a> Scene<'a> {
             b = a.lerp(b, (a.z - near) / (a.z - b.z));
         }
         let (p, q) = (view.pixel(a) / FINE as f32, view.pixel(b) / FINE as f32);
-        let (along, across) = if (q - p).x.abs() > (q - p).y.abs() {
-            (0, 1)
-        } else {
-            (1, 0)
-        };
+        let (along, across) = if (q - p).x.abs() > (q - p).y.abs() { (0, 1) } else { (1, 0) };
         let size = [image.width as f32, image.height as f32];
-        let (from, to) = (
-            p[along].min(q[along]).max(0.0),
-            p[along].max(q[along]).min(size[along]),
-        );
-        let color = line
-            .color
-            .map(|x| f32::from(srgb[(x.clamp(0.0, 1.0) * 4096.0 + 0.5) as usize]));
+        let (from, to) = (p[along].min(q[along]).max(0.0), p[along].max(q[along]).min(size[along]));
+        let color = line.color.map(|x| f32::from(srgb[(x.clamp(0.0, 1.0) * 4096.0 + 0.5) as usize]));
         for step in from.round() as usize..to.round().max(0.0) as usize {
             let t = (step as f32 + 0.5 - p[along]) / (q[along] - p[along]);
             let (place, depth) = (p.lerp(q, t)[across], 1.0 / (1.0 / a.z).lerp(1.0 / b.z, t)); // 1/depth is linear in the picture
-            for side in (place - 1.5).floor().max(0.0) as usize
-                ..(place + 1.5).clamp(0.0, size[across]) as usize
-            {
+            for side in (place - 1.5).floor().max(0.0) as usize..(place + 1.5).clamp(0.0, size[across]) as usize {
                 let cover = (1.2 - (side as f32 + 0.5 - place).abs()).clamp(0.0, 1.0);
-                let (x, y) = if along == 0 {
-                    (step, side)
-                } else {
-                    (side, step)
-                };
-                let free = |i: usize| {
-                    self.seen.at(FINE * x + i % FINE, FINE * y + i / FINE).0 > 0.9999 * depth
-                };
-                let share = cover * (0..FINE * FINE).filter(|i| free(*i)).count() as f32
-                    / (FINE * FINE) as f32;
+                let (x, y) = if along == 0 { (step, side) } else { (side, step) };
+                let free = |i: usize| self.seen.at(FINE * x + i % FINE, FINE * y + i / FINE).0 > 0.9999 * depth;
+                let share = cover * (0..FINE * FINE).filter(|i| free(*i)).count() as f32 / (FINE * FINE) as f32;
                 let at = 4 * (y * image.width + x);
                 for (byte, color) in image.rgba[at..at + 3].iter_mut().zip(color) {
                     *byte = f32::from(*byte).lerp(color, share).round() as u8;
@@ -406,7 +309,5 @@ impl<'a> Scene<'a> {
 
 /// Points spread evenly over the unit disc, on a spiral of golden angles.
 fn spiral<const N: usize>() -> [Vec2; N] {
-    std::array::from_fn(|i| {
-        ((i as f32 + 0.5) / N as f32).sqrt() * Vec2::from_angle(2.399_963_2 * i as f32)
-    })
+    std::array::from_fn(|i| ((i as f32 + 0.5) / N as f32).sqrt() * Vec2::from_angle(2.399_963_2 * i as f32))
 }

@@ -67,8 +67,7 @@ fn height(p: DVec2) -> f64 {
     // The slope's walls: a bowl of the heads' size in the middle, then rock. Both fade out towards the tank.
     let fade = 1.0 - ramp(p.x, 0.72, 1.0);
     let bowl = 0.20 * ramp(aside, 0.10, 0.34);
-    let rock =
-        ramp(aside, 0.20, 0.36) * (0.33 * crags(dvec2(3.1, 4.3) * p + dvec2(11.7, 5.2)) - 0.03);
+    let rock = ramp(aside, 0.20, 0.36) * (0.33 * crags(dvec2(3.1, 4.3) * p + dvec2(11.7, 5.2)) - 0.03);
     floor + fade * (bowl + rock)
 }
 
@@ -78,11 +77,8 @@ fn mountain() -> Solid {
     let (columns, layer) = (nx + 1, (nx + 1) * (ny + 1));
     let at = |x: u32, y: u32| y * columns + x;
 
-    let places = || {
-        (0..=ny).flat_map(|y| {
-            (0..=nx).map(move |x| EXTENT * dvec2(x as f64 / nx as f64, y as f64 / ny as f64))
-        })
-    };
+    let places =
+        || (0..=ny).flat_map(|y| (0..=nx).map(move |x| EXTENT * dvec2(x as f64 / nx as f64, y as f64 / ny as f64)));
     let top = places().map(|p| p.extend(height(p)));
     let bottom = places().map(|p| p.extend(BOTTOM));
     let vertices = top.chain(bottom).collect();
@@ -105,21 +101,11 @@ fn mountain() -> Solid {
         skirt(at(nx, y), at(nx, y + 1));
         skirt(at(0, y + 1), at(0, y));
     }
-    Solid {
-        vertices,
-        triangles,
-    }
+    Solid { vertices, triangles }
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let default = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../scenes/meshes/mountain.obj"
-    );
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/meshes/mountain.obj");
     let path = std::env::args().nth(1).unwrap_or(default.into());
-    mountain().save_obj(
-        &path,
-        "jetsam's mountain: a slide into a tank, in metres, up +z; made by make_mountain.rs",
-        4,
-    )
+    mountain().save_obj(&path, "jetsam's mountain: a slide into a tank, in metres, up +z; made by make_mountain.rs", 4)
 }

@@ -21,11 +21,7 @@ const HALF: f64 = 0.62;
 fn ellipsoid(p: DVec3, center: DVec3, radii: DVec3) -> f64 {
     let q = (p - center) / radii;
     let stretched = (q / radii).length();
-    if stretched < 1e-9 {
-        -radii.min_element()
-    } else {
-        q.length() * (q.length() - 1.0) / stretched
-    }
+    if stretched < 1e-9 { -radii.min_element() } else { q.length() * (q.length() - 1.0) / stretched }
 }
 
 fn sphere(p: DVec3, center: DVec3, radius: f64) -> f64 {
@@ -54,11 +50,7 @@ fn scoop(a: f64, b: f64, k: f64) -> f64 {
 fn arc(p: DVec2, center: DVec2, radius: f64, half_angle: f64) -> f64 {
     let q = dvec2((p.x - center.x).abs(), center.y - p.y);
     let end = radius * dvec2(half_angle.sin(), half_angle.cos());
-    if q.x.atan2(q.y) <= half_angle {
-        (q.length() - radius).abs()
-    } else {
-        q.distance(end)
-    }
+    if q.x.atan2(q.y) <= half_angle { (q.length() - radius).abs() } else { q.distance(end) }
 }
 
 /// The monkey head: negative inside.
@@ -147,22 +139,12 @@ fn polygonise(cell: f64) -> Solid {
     let n = (2.0 * HALF / cell) as u32 + 1;
     let point = |index: [f64; 3]| taper((DVec3::from(index) - 0.5 * (n - 1) as f64) * cell);
     let grid = RuntimeShape::<u32, 3>::new([n; 3]);
-    let field: Vec<f32> = (0..grid.size())
-        .map(|i| monkey(point(grid.delinearize(i).map(f64::from))) as f32)
-        .collect();
+    let field: Vec<f32> = (0..grid.size()).map(|i| monkey(point(grid.delinearize(i).map(f64::from))) as f32).collect();
     let mut net = SurfaceNetsBuffer::default();
     surface_nets(&field, &grid, [0; 3], [n - 1; 3], &mut net);
     let mut solid = Solid {
-        vertices: net
-            .positions
-            .iter()
-            .map(|v| settle(point(v.map(f64::from))))
-            .collect(),
-        triangles: net
-            .indices
-            .chunks_exact(3)
-            .map(|t| [t[0], t[1], t[2]])
-            .collect(),
+        vertices: net.positions.iter().map(|v| settle(point(v.map(f64::from)))).collect(),
+        triangles: net.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
     };
     for _ in 0..12 {
         relax(&mut solid, 0.5);
@@ -171,10 +153,7 @@ fn polygonise(cell: f64) -> Solid {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let default = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../scenes/meshes/monkey.obj"
-    );
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/meshes/monkey.obj");
     let path = std::env::args().nth(1).unwrap_or(default.into());
 
     // Surface nets pinch two sheets into one edge where both pass through one cell, which happens now and then in a
@@ -184,13 +163,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .map(polygonise)
         .find(|solid| solid.check().is_ok())
         .ok_or("no cell size gave a manifold")?;
-    let off = solid
-        .vertices
-        .iter()
-        .map(|v| monkey(*v).abs())
-        .fold(0.0, f64::max);
+    let off = solid.vertices.iter().map(|v| monkey(*v).abs()).fold(0.0, f64::max);
     println!("largest distance of a vertex from the sculpture: {off:.1e}");
-    let title =
-        "jetsam's monkey head: 1 unit from ear to ear, up +z, face to -y; made by sculpt_monkey.rs";
+    let title = "jetsam's monkey head: 1 unit from ear to ear, up +z, face to -y; made by sculpt_monkey.rs";
     solid.save_obj(&path, title, 4)
 }

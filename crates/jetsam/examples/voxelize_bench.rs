@@ -7,21 +7,14 @@ use jetsam::voxelize::{Resolution, Rule, VoxelizeOptions, voxelize};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let runs: usize = std::env::args().nth(1).map_or(Ok(15), |a| a.parse())?;
     let knot = Mesh::torus_knot(2, 3, 1.0, 0.3, 1200, 30);
-    let wanted = VoxelizeOptions {
-        resolution: Resolution::Particles(1_000_000),
-        ..Default::default()
-    };
+    let wanted = VoxelizeOptions { resolution: Resolution::Particles(1_000_000), ..Default::default() };
     let spacing = voxelize(&knot, &wanted)?.spacing;
     // The same knot with every tenth strip of triangles missing: long rims, so that the tree has to work.
     let mut torn = knot.clone();
     torn.triangles.retain(|t| t[0] % 300 > 3);
     for (name, mesh) in [("closed", &knot), ("torn", &torn)] {
         for rule in [Rule::Parity, Rule::Winding] {
-            let options = VoxelizeOptions {
-                rule,
-                resolution: Resolution::Spacing(spacing),
-                ..Default::default()
-            };
+            let options = VoxelizeOptions { rule, resolution: Resolution::Spacing(spacing), ..Default::default() };
             let mut millis = Vec::new();
             let mut last = None;
             for _ in 0..if name == "torn" { 1 } else { runs } {
@@ -38,8 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 voxels.dims,
                 millis[millis.len() / 2],
                 millis[0],
-                voxels.bits.words().len() as f64 * 64.0
-                    / voxels.dims.iter().map(|d| f64::from(*d)).product::<f64>(),
+                voxels.bits.words().len() as f64 * 64.0 / voxels.dims.iter().map(|d| f64::from(*d)).product::<f64>(),
             );
         }
     }

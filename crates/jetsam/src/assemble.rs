@@ -88,14 +88,19 @@ impl Scene {
             return Err(self.error("world.gravity", message, "give gravity = [x, 0, z]"));
         }
         if self.fluid.is_empty() && self.rigid.is_empty() {
-            return Err(self.error("", "the scene has neither fluid nor rigid bodies", "add a [[fluid]] or a [[rigid]]"));
+            return Err(self.error(
+                "",
+                "the scene has neither fluid nor rigid bodies",
+                "add a [[fluid]] or a [[rigid]]",
+            ));
         }
         let support = self.solver.support * self.resolution.spacing;
         for a in 0..3 {
             let length = self.domain.max[a] - self.domain.min[a];
             let flat = self.world.dimensions == 2 && a == 1;
             if self.domain.walls[a] == Wall::Periodic && !flat && length < 3.0 * support {
-                let message = format!("a periodic axis of {length} m is shorter than three supports ({:.4} m)", 3.0 * support);
+                let message =
+                    format!("a periodic axis of {length} m is shorter than three supports ({:.4} m)", 3.0 * support);
                 return Err(self.error("domain.walls", message, "lengthen the domain or choose a smaller spacing"));
             }
         }
@@ -178,7 +183,13 @@ impl Scene {
     }
 
     /// Place, rotation and number of each copy of a rigid body.
-    fn copies(&self, rigid: &Rigid, index: usize, solid: &Solid, key: &str) -> Result<Vec<(DVec3, DQuat, Option<u32>)>> {
+    fn copies(
+        &self,
+        rigid: &Rigid,
+        index: usize,
+        solid: &Solid,
+        key: &str,
+    ) -> Result<Vec<(DVec3, DQuat, Option<u32>)>> {
         let position = DVec3::from(rigid.position);
         let turn = axis_angle(rigid.rotation);
         let Some(copies) = &rigid.copies else { return Ok(vec![(position, turn, None)]) };
@@ -202,8 +213,8 @@ impl Scene {
             }
             (None, Some(region)) => {
                 // a ball about the centre of mass that holds the body in any orientation
-                let radius = solid.points.iter().map(|p| p.distance(solid.center)).fold(0.0, f64::max)
-                    + self.resolution.spacing;
+                let radius =
+                    solid.points.iter().map(|p| p.distance(solid.center)).fold(0.0, f64::max) + self.resolution.spacing;
                 let (min, max) = (DVec3::from(region.min) + radius, DVec3::from(region.max) - radius);
                 let mut placed: Vec<DVec3> = Vec::new();
                 let mut draw = 0;
@@ -218,7 +229,8 @@ impl Scene {
                         placed.push(c);
                     }
                     if draw > 1000 * u64::from(copies.count) + 1000 || !(max - min).cmpge(DVec3::ZERO).all() {
-                        let message = format!("`{key}`: only {} of {} copies fit into the box", placed.len(), copies.count);
+                        let message =
+                            format!("`{key}`: only {} of {} copies fit into the box", placed.len(), copies.count);
                         return Err(self.error(&key, message, "enlarge the box, or ask for fewer copies"));
                     }
                 }
@@ -227,7 +239,11 @@ impl Scene {
             }
             _ => {
                 let message = format!("`{key}` needs either `grid` or `random`");
-                Err(self.error(&key, message, "add grid = { columns = [..], step = [..] } or random = { min = .., max = .. }"))
+                Err(self.error(
+                    &key,
+                    message,
+                    "add grid = { columns = [..], step = [..] } or random = { min = .., max = .. }",
+                ))
             }
         }
     }
@@ -242,16 +258,30 @@ impl Scene {
                 if p[a] < grid.min[a] - slack || p[a] > grid.max[a] + slack {
                     let message = format!(
                         "body `{}` reaches {} = {:.4} m, outside the domain [{}, {}]",
-                        body.name, ["x", "y", "z"][a], p[a], grid.min[a], grid.max[a]
+                        body.name,
+                        ["x", "y", "z"][a],
+                        p[a],
+                        grid.min[a],
+                        grid.max[a]
                     );
-                    return Err(self.error(&format!("{key}.position"), message, "move or shrink the body, or enlarge the domain"));
+                    return Err(self.error(
+                        &format!("{key}.position"),
+                        message,
+                        "move or shrink the body, or enlarge the domain",
+                    ));
                 }
             }
         }
         Ok(())
     }
 
-    fn static_bodies(&self, grid: &Grid, volume: f64, layers: usize, warnings: &mut Vec<String>) -> Result<Vec<NewBody>> {
+    fn static_bodies(
+        &self,
+        grid: &Grid,
+        volume: f64,
+        layers: usize,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<NewBody>> {
         let mut all = Vec::new();
         let walls = self.wall_points(grid, layers as i64);
         let mut taken = Near::new(0.5 * self.resolution.spacing);
@@ -269,9 +299,8 @@ impl Scene {
             let turn = axis_angle(fixed.rotation);
             let mut body = NewBody::new(name, &solid, DVec3::from(fixed.position), turn, self.world.dimensions);
             let skin = skin(&solid.points, self.resolution.spacing, layers as i64, self.world.dimensions);
-            let inside = |p: DVec3| {
-                (0..3).all(|a| (f64::from(grid.lower[a])..=f64::from(grid.upper[a])).contains(&p[a]))
-            };
+            let inside =
+                |p: DVec3| (0..3).all(|a| (f64::from(grid.lower[a])..=f64::from(grid.upper[a])).contains(&p[a]));
             let kept = skin.into_iter().map(|k| body.offset[k]).filter(|&o| {
                 let p = body.x + body.q * o;
                 inside(p) && !taken.has(p, None)
@@ -357,9 +386,8 @@ impl Scene {
             warnings.extend(solid.warnings.iter().cloned());
             let before = fluid.len();
             for p in solid.points {
-                let within = (0..3).all(|a| {
-                    self.world.dimensions == 2 && a == 1 || (p[a] >= grid.min[a] && p[a] <= grid.max[a])
-                });
+                let within = (0..3)
+                    .all(|a| self.world.dimensions == 2 && a == 1 || (p[a] >= grid.min[a] && p[a] <= grid.max[a]));
                 if !within {
                     outside += 1;
                 } else if carver.has(p, None) {
@@ -442,13 +470,7 @@ impl Scene {
     }
 
     /// Largest speed the scene can reach (m/s): from depth, drop height and velocities given.
-    fn largest_speed(
-        &self,
-        fluid: &[(DVec3, DVec3, u32)],
-        bodies: &[NewBody],
-        gravity: DVec3,
-        grid: &Grid,
-    ) -> f64 {
+    fn largest_speed(&self, fluid: &[(DVec3, DVec3, u32)], bodies: &[NewBody], gravity: DVec3, grid: &Grid) -> f64 {
         let g = gravity.length();
         let mut speed: f64 = 0.0;
         if g > 0.0 {
@@ -498,7 +520,8 @@ impl Scene {
             }
             let own = || fluid.iter().filter(|p| p.2 == index as u32).map(|p| p.0.dot(up));
             let half = 0.5 * self.resolution.spacing;
-            let (bottom, top) = (own().fold(f64::INFINITY, f64::min) - half, own().fold(f64::NEG_INFINITY, f64::max) + half);
+            let (bottom, top) =
+                (own().fold(f64::INFINITY, f64::min) - half, own().fold(f64::NEG_INFINITY, f64::max) + half);
             let depth = top - bottom;
             let c_sq = sound_speed * sound_speed;
             // height y above the bottom at rest -> height under its own weight: integral of rho_0 / rho
@@ -669,7 +692,10 @@ fn warn_of_overlap(bodies: &[NewBody], spacing: f64, warnings: &mut Vec<String>)
     for (index, body) in bodies.iter().enumerate() {
         let deep = body.points().filter(|&p| near.has(p, Some(index as u32))).count();
         if deep > 0 {
-            warnings.push(format!("body `{}` overlaps another by {deep} particles: contacts will push them apart", body.name));
+            warnings.push(format!(
+                "body `{}` overlaps another by {deep} particles: contacts will push them apart",
+                body.name
+            ));
         }
     }
 }

@@ -183,11 +183,8 @@ impl Model {
             let rate = self.largest_speed / (self.solver.contact_overlap * self.spacing);
             mass * (rate * rate) as f32 / shared_by
         };
-        let eta = if stated_eta >= 0.0 {
-            stated_eta
-        } else {
-            dashpot(damping_ratio(ln_e), k * shared_by, mass) / shared_by
-        };
+        let eta =
+            if stated_eta >= 0.0 { stated_eta } else { dashpot(damping_ratio(ln_e), k * shared_by, mass) / shared_by };
         (k, eta)
     }
 

@@ -63,17 +63,8 @@ pub struct StageMillis(pub Vec<(Stage, f64)>);
 impl StageMillis {
     /// The world's timers, less what they showed `before`.
     pub fn since(before: &[Duration], world: &World) -> Self {
-        let earlier = before
-            .iter()
-            .copied()
-            .chain(std::iter::repeat(Duration::ZERO));
-        Self(
-            world
-                .timers()
-                .zip(earlier)
-                .map(|((stage, now), then)| (stage, millis(now - then)))
-                .collect(),
-        )
+        let earlier = before.iter().copied().chain(std::iter::repeat(Duration::ZERO));
+        Self(world.timers().zip(earlier).map(|((stage, now), then)| (stage, millis(now - then))).collect())
     }
 }
 
@@ -108,10 +99,7 @@ impl Recorder {
         let (steps, seconds) = (world.steps() - self.steps, world.time() - self.time);
         let (mut dt, mut dt_bound) = world.model().largest_dt(ledger.speed, ledger.acceleration);
         if steps > 0 {
-            (dt, dt_bound) = (
-                seconds / steps as f64,
-                most(world.bounds(), &self.bounds).unwrap_or(dt_bound),
-            );
+            (dt, dt_bound) = (seconds / steps as f64, most(world.bounds(), &self.bounds).unwrap_or(dt_bound));
         }
         let stats = FrameStats {
             frame: self.frames,
@@ -220,17 +208,11 @@ pub fn state_hash(state: &State) -> u64 {
     for (id, i) in order {
         add(&mut hash, &id.to_le_bytes());
         let r = &p.record[i];
-        r.x.iter()
-            .chain(&r.v)
-            .for_each(|x| add(&mut hash, &x.to_bits().to_le_bytes()));
+        r.x.iter().chain(&r.v).for_each(|x| add(&mut hash, &x.to_bits().to_le_bytes()));
     }
     for body in &state.bodies.body {
         let numbers = [body.x.to_array(), body.v.to_array(), body.omega.to_array()];
-        numbers
-            .iter()
-            .flatten()
-            .chain(&body.q.to_array())
-            .for_each(|x| add(&mut hash, &x.to_bits().to_le_bytes()));
+        numbers.iter().flatten().chain(&body.q.to_array()).for_each(|x| add(&mut hash, &x.to_bits().to_le_bytes()));
     }
     hash
 }
@@ -244,10 +226,7 @@ fn add(hash: &mut u64, bytes: &[u8]) {
 /// The bound that was met most often between two readings of [`World::bounds`].
 fn most(now: &[(DtBound, u64)], before: &[(DtBound, u64)]) -> Option<DtBound> {
     let earlier = |bound| before.iter().find(|b| b.0 == bound).map_or(0, |b| b.1);
-    now.iter()
-        .map(|&(bound, n)| (n - earlier(bound), bound))
-        .max()
-        .map(|b| b.1)
+    now.iter().map(|&(bound, n)| (n - earlier(bound), bound)).max().map(|b| b.1)
 }
 
 fn rigid_bodies(state: &State) -> usize {
@@ -255,11 +234,7 @@ fn rigid_bodies(state: &State) -> usize {
 }
 
 fn factor(seconds: f64, wall: Duration) -> f64 {
-    if wall.is_zero() {
-        0.0
-    } else {
-        seconds / wall.as_secs_f64()
-    }
+    if wall.is_zero() { 0.0 } else { seconds / wall.as_secs_f64() }
 }
 
 fn millis(time: Duration) -> f64 {

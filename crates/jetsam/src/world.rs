@@ -73,8 +73,7 @@ impl World {
         world.evaluate();
         world.settle();
         let ledger = world.backend.ledger();
-        world.momentum =
-            MomentumLedger { start: ledger.momentum, impulse: DVec3::ZERO, force: ledger.external_force };
+        world.momentum = MomentumLedger { start: ledger.momentum, impulse: DVec3::ZERO, force: ledger.external_force };
         world.timers = Default::default();
         world
     }

@@ -32,7 +32,11 @@ fn a_ball_of_half_the_density_floats_half_submerged_and_comes_to_rest() {
     let half_ball = std::f64::consts::PI * d * d * d / 12.0;
     let level = (water + half_ball) / (0.8 * 0.8);
     let draft = level - (height - 0.5 * d);
-    println!("draft {:.4} D, off by {:.2} dx; lift {lift:.4} of the weight; speed {fastest:.3} m/s", draft / d, (draft - 0.5 * d) / dx);
+    println!(
+        "draft {:.4} D, off by {:.2} dx; lift {lift:.4} of the weight; speed {fastest:.3} m/s",
+        draft / d,
+        (draft - 0.5 * d) / dx
+    );
     assert!((draft - 0.5 * d).abs() <= 1.0 * dx, "draft {} of the diameter", draft / d);
     assert!((lift - 1.0).abs() <= 0.02, "lift {lift}");
     assert!(fastest < 0.1, "still moves at {fastest} m/s");

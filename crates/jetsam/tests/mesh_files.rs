@@ -12,31 +12,19 @@ fn cuboid() -> Mesh {
 fn is_the_box(mesh: &Mesh) {
     assert_eq!(mesh.triangles.len(), 12);
     let report = mesh.report();
-    assert!(
-        report.watertight && report.boundary_edges == 0 && report.shells == 1,
-        "{report:?}"
-    );
+    assert!(report.watertight && report.boundary_edges == 0 && report.shells == 1, "{report:?}");
     let mass = mesh.mass_properties();
     assert!((mass.volume - 4.5).abs() < 1e-12, "{}", mass.volume);
     assert!(mass.com.distance(DVec3::new(0.0, 0.75, 1.25)) < 1e-12);
 }
 
 fn fault(format: MeshFormat, bytes: &[u8]) -> MeshFault {
-    Mesh::from_bytes(format, bytes)
-        .expect_err("a broken file")
-        .fault
+    Mesh::from_bytes(format, bytes).expect_err("a broken file").fault
 }
 
 fn obj(mesh: &Mesh) -> String {
-    let v: String = mesh
-        .vertices
-        .iter()
-        .map(|v| format!("v {} {} {}\n", v.x, v.y, v.z))
-        .collect();
-    let f = mesh
-        .triangles
-        .iter()
-        .map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
+    let v: String = mesh.vertices.iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z)).collect();
+    let f = mesh.triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
     v + &f.collect::<String>()
 }
 
@@ -49,10 +37,7 @@ fn stl_text(mesh: &Mesh) -> String {
         let corners: String = t.iter().map(corner).collect();
         format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
     };
-    format!(
-        "solid box\n{}endsolid box\n",
-        mesh.triangles.iter().map(facet).collect::<String>()
-    )
+    format!("solid box\n{}endsolid box\n", mesh.triangles.iter().map(facet).collect::<String>())
 }
 
 fn stl_binary(mesh: &Mesh, header: &[u8]) -> Vec<u8> {
@@ -85,21 +70,9 @@ fn ply(mesh: &Mesh, encoding: &str) -> Vec<u8> {
             continue;
         }
         let (x, y, z) = (v.x as f32, v.y, v.z as f32);
-        bytes.extend(if big {
-            x.to_be_bytes()
-        } else {
-            x.to_le_bytes()
-        });
-        bytes.extend(if big {
-            y.to_be_bytes()
-        } else {
-            y.to_le_bytes()
-        });
-        bytes.extend(if big {
-            z.to_be_bytes()
-        } else {
-            z.to_le_bytes()
-        });
+        bytes.extend(if big { x.to_be_bytes() } else { x.to_le_bytes() });
+        bytes.extend(if big { y.to_be_bytes() } else { y.to_le_bytes() });
+        bytes.extend(if big { z.to_be_bytes() } else { z.to_le_bytes() });
     }
     for t in &mesh.triangles {
         if ascii {
@@ -108,11 +81,7 @@ fn ply(mesh: &Mesh, encoding: &str) -> Vec<u8> {
         }
         bytes.push(3);
         for v in t.map(|v| v as i32) {
-            bytes.extend(if big {
-                v.to_be_bytes()
-            } else {
-                v.to_le_bytes()
-            });
+            bytes.extend(if big { v.to_be_bytes() } else { v.to_le_bytes() });
         }
     }
     bytes
@@ -121,19 +90,9 @@ fn ply(mesh: &Mesh, encoding: &str) -> Vec<u8> {
 /// A GLB whose mesh is moved into place by two nodes, one of them mirroring if asked.
 fn glb(mesh: &Mesh, nodes: &str) -> Vec<u8> {
     let mut bin: Vec<u8> = Vec::new();
-    bin.extend(
-        mesh.vertices
-            .iter()
-            .flat_map(|v| v.to_array())
-            .flat_map(|x| (x as f32).to_le_bytes()),
-    );
+    bin.extend(mesh.vertices.iter().flat_map(|v| v.to_array()).flat_map(|x| (x as f32).to_le_bytes()));
     let indices = bin.len();
-    bin.extend(
-        mesh.triangles
-            .iter()
-            .flatten()
-            .flat_map(|v| (*v as u16).to_le_bytes()),
-    );
+    bin.extend(mesh.triangles.iter().flatten().flat_map(|v| (*v as u16).to_le_bytes()));
     while !bin.len().is_multiple_of(4) {
         bin.push(0);
     }
@@ -155,12 +114,7 @@ fn glb(mesh: &Mesh, nodes: &str) -> Vec<u8> {
         json.push(b' ');
     }
     let mut bytes = b"glTF".to_vec();
-    for word in [
-        2,
-        (12 + 8 + json.len() + 8 + bin.len()) as u32,
-        json.len() as u32,
-        0x4e4f_534a,
-    ] {
+    for word in [2, (12 + 8 + json.len() + 8 + bin.len()) as u32, json.len() as u32, 0x4e4f_534a] {
         bytes.extend(word.to_le_bytes());
     }
     bytes.extend(json);
@@ -180,10 +134,7 @@ fn the_same_box_from_every_format() {
         (MeshFormat::Obj, obj(&mesh).into_bytes()),
         (MeshFormat::Stl, stl_text(&mesh).into_bytes()),
         (MeshFormat::Stl, stl_binary(&mesh, b"a box")),
-        (
-            MeshFormat::Stl,
-            stl_binary(&mesh, b"solid although it is binary"),
-        ),
+        (MeshFormat::Stl, stl_binary(&mesh, b"solid although it is binary")),
         (MeshFormat::Ply, ply(&mesh, "ascii")),
         (MeshFormat::Ply, ply(&mesh, "binary_little_endian")),
         (MeshFormat::Ply, ply(&mesh, "binary_big_endian")),
@@ -198,11 +149,7 @@ fn the_same_box_from_every_format() {
 fn a_mirrored_node_keeps_outside_outside() {
     let nodes = r#"[{"children":[1],"scale":[-1,1,1]},{"mesh":0}]"#;
     let mesh = Mesh::from_bytes(MeshFormat::Gltf, &glb(&cuboid(), nodes)).expect("a good file");
-    assert!(
-        (mesh.mass_properties().volume - 4.5).abs() < 1e-6,
-        "{}",
-        mesh.mass_properties().volume
-    );
+    assert!((mesh.mass_properties().volume - 4.5).abs() < 1e-6, "{}", mesh.mass_properties().volume);
 }
 
 #[test]
@@ -225,17 +172,11 @@ fn files_are_found_by_extension_and_errors_name_them() {
     let broken = folder.join("broken.obj");
     std::fs::write(&broken, "v 0 0 0\nv 1 0 0\nf 1 2 9\n").expect("a file");
     let error = Mesh::load(&broken).expect_err("a broken file");
-    assert!(
-        error.to_string().contains("broken.obj") && !error.help.is_empty(),
-        "{error}"
-    );
+    assert!(error.to_string().contains("broken.obj") && !error.help.is_empty(), "{error}");
     std::fs::remove_dir_all(&folder).expect("the folder goes");
 
     let missing = Mesh::load(Path::new("no/such/mesh.stl")).expect_err("no file");
-    assert!(
-        matches!(missing.fault, MeshFault::Unreadable(_))
-            && missing.to_string().contains("no/such/mesh.stl")
-    );
+    assert!(matches!(missing.fault, MeshFault::Unreadable(_)) && missing.to_string().contains("no/such/mesh.stl"));
     let strange = Mesh::load(Path::new("mesh.fbx")).expect_err("no format");
     assert_eq!(strange.fault, MeshFault::UnknownFormat("fbx".into()));
 }
@@ -244,22 +185,12 @@ fn files_are_found_by_extension_and_errors_name_them() {
 fn broken_bytes_are_errors() {
     use MeshFormat::*;
     for format in [Obj, Stl, Ply, Gltf] {
-        for bytes in [
-            &b""[..],
-            b"solid",
-            b"ply\n",
-            b"glTF",
-            b"\xff\xfe\x00\x01",
-            &[0; 200],
-        ] {
+        for bytes in [&b""[..], b"solid", b"ply\n", b"glTF", b"\xff\xfe\x00\x01", &[0; 200]] {
             fault(format, bytes);
         }
     }
     assert_eq!(fault(Obj, b"v 0 0 0\n"), MeshFault::Empty);
-    assert_eq!(
-        fault(Obj, b"v 0 0 0\nv 1 nan 0\nv 1 1 0\nf 1 2 3\n"),
-        MeshFault::NotFinite { vertex: 1 }
-    );
+    assert_eq!(fault(Obj, b"v 0 0 0\nv 1 nan 0\nv 1 1 0\nf 1 2 3\n"), MeshFault::NotFinite { vertex: 1 });
     // Cut short, and counts that lie.
     let mesh = cuboid();
     for (format, bytes) in [
@@ -276,44 +207,23 @@ fn broken_bytes_are_errors() {
     lie[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
     fault(Stl, &lie);
     for count in ["4000000000", "18446744073709551615", "-1"] {
-        let text = String::from_utf8(ply(&mesh, "ascii"))
-            .expect("text")
-            .replace("face 12", &format!("face {count}"));
+        let text = String::from_utf8(ply(&mesh, "ascii")).expect("text").replace("face 12", &format!("face {count}"));
         fault(Ply, text.as_bytes());
-        let empty =
-            format!("ply\nformat binary_little_endian 1.0\nelement thing {count}\nend_header\n");
+        let empty = format!("ply\nformat binary_little_endian 1.0\nelement thing {count}\nend_header\n");
         fault(Ply, empty.as_bytes());
     }
     let text = String::from_utf8(ply(&mesh, "ascii")).expect("text");
     let negative = text.replace("3 0 4 6\n", "3 0 -4 6\n");
     assert_ne!(text, negative);
-    assert_eq!(
-        fault(Ply, negative.as_bytes()),
-        MeshFault::IndexOutOfRange {
-            triangle: 0,
-            vertices: 8
-        }
-    );
+    assert_eq!(fault(Ply, negative.as_bytes()), MeshFault::IndexOutOfRange { triangle: 0, vertices: 8 });
     // A glTF that asks for other files, or whose nodes run in a circle.
-    for uri in [
-        "../../secret.bin",
-        "/etc/passwd",
-        "file:///etc/passwd",
-        "a%FFb.bin",
-        "x.bin",
-    ] {
+    for uri in ["../../secret.bin", "/etc/passwd", "file:///etc/passwd", "a%FFb.bin", "x.bin"] {
         let json = format!(
             r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[]}}],"buffers":[{{"byteLength":4,"uri":"{uri}"}}]}}"#
         );
-        assert!(
-            fault(Gltf, json.as_bytes()).to_string().contains("buffer"),
-            "{uri}"
-        );
+        assert!(fault(Gltf, json.as_bytes()).to_string().contains("buffer"), "{uri}");
     }
-    fault(
-        Gltf,
-        &glb(&mesh, r#"[{"mesh":0,"children":[1]},{"children":[0]}]"#),
-    );
+    fault(Gltf, &glb(&mesh, r#"[{"mesh":0,"children":[1]},{"children":[0]}]"#));
 }
 
 #[test]
@@ -330,10 +240,7 @@ fn what_fuzzing_found_in_glb() {
     // Accessors, views, meshes and nodes that are not there. The key is misspelt so that the list is empty.
     for key in ["accessors", "bufferViews", "buffers", "meshes", "scenes"] {
         let from = format!("\"{key}\"").into_bytes();
-        let at = good
-            .windows(from.len())
-            .position(|w| w == from)
-            .expect("the key");
+        let at = good.windows(from.len()).position(|w| w == from).expect("the key");
         let mut bytes = good.clone();
         bytes[at + 1] = b'#';
         fault(MeshFormat::Gltf, &bytes);

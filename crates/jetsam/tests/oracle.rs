@@ -134,12 +134,7 @@ fn compare(text: &str, disturb: impl Fn(&mut Assembly), period: DVec3) {
         .flat_map(|kind| p.segment(kind).map(move |i| (kind, i)))
         .map(|(kind, i)| {
             let r = p.record[i];
-            P {
-                kind,
-                x: DVec3::from(r.x.map(f64::from)),
-                v: DVec3::from(r.v.map(f64::from)),
-                volume: r.volume.into(),
-            }
+            P { kind, x: DVec3::from(r.x.map(f64::from)), v: DVec3::from(r.v.map(f64::from)), volume: r.volume.into() }
         })
         .collect();
     let expected = oracle(&particles, &assembly, period);
@@ -247,8 +242,7 @@ fn neighbours_on_faces_of_cells_and_at_the_edge_of_the_support() {
 
 #[test]
 fn all_particles_in_one_cell() {
-    let points: Vec<[f64; 3]> =
-        (0..200).map(|i| [0, 1, 2].map(|a| 0.05 + 0.9 * random::uniform(5, a, i))).collect();
+    let points: Vec<[f64; 3]> = (0..200).map(|i| [0, 1, 2].map(|a| 0.05 + 0.9 * random::uniform(5, a, i))).collect();
     compare(&placed(&points), |a| squeeze_onto(a, &points), DVec3::ZERO);
 }
 

@@ -60,12 +60,8 @@ impl Tank {
             let walls = self.world.state().bodies.body.iter().find(|b| b.is_static()).unwrap();
             weight += walls.force.z;
             // the two lowest layers, carried down to the floor by the weight between
-            let low: Vec<f64> = self
-                .profile()
-                .into_iter()
-                .filter(|(z, _)| *z < 2.0 * spacing)
-                .map(|(z, p)| p + RHO * G * z)
-                .collect();
+            let low: Vec<f64> =
+                self.profile().into_iter().filter(|(z, _)| *z < 2.0 * spacing).map(|(z, p)| p + RHO * G * z).collect();
             let sensor = low.iter().sum::<f64>() / low.len() as f64;
             bottom += sensor;
             squares += sensor * sensor;

@@ -27,13 +27,7 @@ impl BodiesCsv {
 
 impl Writer for BodiesCsv {
     fn write(&mut self, world: &World, _: &FrameStats) -> miette::Result<()> {
-        let bodies = world
-            .state()
-            .bodies
-            .body
-            .iter()
-            .enumerate()
-            .filter(|(_, b)| !b.is_static());
+        let bodies = world.state().bodies.body.iter().enumerate().filter(|(_, b)| !b.is_static());
         for (index, body) in bodies {
             line(&mut self.file, world.time(), index, body).map_err(at(&self.path))?;
         }
@@ -49,12 +43,7 @@ fn line(file: &mut impl Write, time: f64, index: usize, b: &Body) -> io::Result<
     write!(file, "{time},{index},{}", quoted(&b.name))?;
     let turn = [b.q.w, b.q.x, b.q.y, b.q.z];
     let vectors = [b.v, b.omega, b.force, b.torque];
-    for number in
-        b.x.to_array()
-            .into_iter()
-            .chain(turn)
-            .chain(vectors.into_iter().flat_map(|v| v.to_array()))
-    {
+    for number in b.x.to_array().into_iter().chain(turn).chain(vectors.into_iter().flat_map(|v| v.to_array())) {
         write!(file, ",{number}")?;
     }
     writeln!(file)
@@ -62,9 +51,5 @@ fn line(file: &mut impl Write, time: f64, index: usize, b: &Body) -> io::Result<
 
 /// A name as RFC 4180 wants it.
 fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", name.replace('"', "\"\""))
-    } else {
-        name.to_owned()
-    }
+    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
 }

@@ -27,12 +27,7 @@ pub struct Outputs(Vec<Box<dyn Writer>>);
 
 impl Outputs {
     /// Makes the folder and opens what was asked for in it.
-    pub fn create(
-        folder: &Path,
-        save: &[Save],
-        scene: &Scene,
-        world: &World,
-    ) -> miette::Result<Self> {
+    pub fn create(folder: &Path, save: &[Save], scene: &Scene, world: &World) -> miette::Result<Self> {
         std::fs::create_dir_all(folder).map_err(at(folder))?;
         let wants = |kind| save.contains(&kind);
         let mut all: Vec<Box<dyn Writer>> = vec![Box::new(stats::Stats::create(folder)?)];
@@ -40,27 +35,13 @@ impl Outputs {
             all.push(Box::new(bodies_csv::BodiesCsv::create(folder)?));
         }
         if wants(Save::Png) || wants(Save::Mp4) {
-            all.push(Box::new(pictures::Pictures::create(
-                folder,
-                wants(Save::Png),
-                wants(Save::Mp4),
-                scene,
-                world,
-            )?));
+            all.push(Box::new(pictures::Pictures::create(folder, wants(Save::Png), wants(Save::Mp4), scene, world)?));
         }
         if wants(Save::Ply) {
-            all.push(Box::new(particles::Particles::new(
-                folder,
-                "ply",
-                ply::write_particles,
-            )));
+            all.push(Box::new(particles::Particles::new(folder, "ply", ply::write_particles)));
         }
         if wants(Save::Vtk) {
-            all.push(Box::new(particles::Particles::new(
-                folder,
-                "vtk",
-                vtk::write_particles,
-            )));
+            all.push(Box::new(particles::Particles::new(folder, "vtk", vtk::write_particles)));
         }
         Ok(Self(all))
     }
@@ -83,10 +64,7 @@ pub fn create(path: &Path) -> miette::Result<BufWriter<File>> {
 
 /// Says of an error of the system which path it is about.
 pub fn at(path: &Path) -> impl Fn(io::Error) -> Error {
-    move |source| Error::Io {
-        path: path.display().to_string(),
-        source,
-    }
+    move |source| Error::Io { path: path.display().to_string(), source }
 }
 
 /// `frame_00042.png`

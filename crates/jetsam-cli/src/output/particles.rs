@@ -34,11 +34,7 @@ pub struct Particles {
 impl Particles {
     /// Files with this extension, in this format.
     pub fn new(folder: &Path, extension: &'static str, format: Format) -> Self {
-        Self {
-            folder: folder.into(),
-            extension,
-            format,
-        }
+        Self { folder: folder.into(), extension, format }
     }
 }
 
@@ -46,9 +42,7 @@ impl Writer for Particles {
     fn write(&mut self, world: &World, stats: &FrameStats) -> miette::Result<()> {
         let path = frame_path(&self.folder, stats.frame, self.extension);
         let mut file = create(&path)?;
-        (self.format)(&mut file, &rows(world), stats.time)
-            .and_then(|()| file.flush())
-            .map_err(at(&path))?;
+        (self.format)(&mut file, &rows(world), stats.time).and_then(|()| file.flush()).map_err(at(&path))?;
         Ok(())
     }
 
@@ -73,12 +67,7 @@ fn rows(world: &World) -> Vec<Row> {
                 pressure = r.share * d * d;
             }
             let ([x, y, z], [vx, vy, vz]) = (r.x, r.v);
-            Row {
-                numbers: [x, y, z, vx, vy, vz, density, pressure],
-                kind: kind as u8,
-                owner: p.owner[i],
-                id: p.id[i],
-            }
+            Row { numbers: [x, y, z, vx, vy, vz, density, pressure], kind: kind as u8, owner: p.owner[i], id: p.id[i] }
         }));
     }
     all

@@ -30,24 +30,12 @@ pub struct Pictures {
 
 impl Pictures {
     /// Pictures as files, as a video, or both.
-    pub fn create(
-        folder: &Path,
-        files: bool,
-        video: bool,
-        scene: &Scene,
-        world: &World,
-    ) -> miette::Result<Self> {
+    pub fn create(folder: &Path, files: bool, video: bool, scene: &Scene, world: &World) -> miette::Result<Self> {
         let name = folder.file_name().unwrap_or("video".as_ref());
         let path = folder.join(name).with_extension("mp4");
         let rate = scene.run.frames_per_second;
-        let video = video
-            .then(|| Video::create(path, WIDTH, HEIGHT, rate))
-            .transpose()?;
-        Ok(Self {
-            folder: files.then(|| folder.into()),
-            video,
-            painter: Painter::new(scene, world),
-        })
+        let video = video.then(|| Video::create(path, WIDTH, HEIGHT, rate)).transpose()?;
+        Ok(Self { folder: files.then(|| folder.into()), video, painter: Painter::new(scene, world) })
     }
 }
 
@@ -55,13 +43,9 @@ impl Writer for Pictures {
     fn write(&mut self, world: &World, stats: &FrameStats) -> miette::Result<()> {
         let image = self.painter.paint(world);
         if let Some(folder) = &self.folder {
-            image
-                .save_png(frame_path(folder, stats.frame, "png"))
-                .into_diagnostic()?;
+            image.save_png(frame_path(folder, stats.frame, "png")).into_diagnostic()?;
         }
-        self.video
-            .as_mut()
-            .map_or(Ok(()), |video| video.write(&image))
+        self.video.as_mut().map_or(Ok(()), |video| video.write(&image))
     }
 
     fn finish(&mut self) -> miette::Result<()> {
@@ -100,23 +84,12 @@ impl Painter {
                 fov_y: c.fov.to_radians() as f32,
             },
             None => {
-                let from = if flat {
-                    Vec3::NEG_Y
-                } else {
-                    Vec3::new(0.55, -1.0, 0.4)
-                };
+                let from = if flat { Vec3::NEG_Y } else { Vec3::new(0.55, -1.0, 0.4) };
                 let margin = 0.04 * (max - min);
-                Camera::framing(
-                    min - margin,
-                    max + margin,
-                    from,
-                    0.5,
-                    WIDTH as f32 / HEIGHT as f32,
-                )
+                Camera::framing(min - margin, max + margin, from, 0.5, WIDTH as f32 / HEIGHT as f32)
             }
         };
-        let solid_floor =
-            !flat && scene.domain.walls[2] == Wall::Solid && scene.world.gravity[2] < 0.0;
+        let solid_floor = !flat && scene.domain.walls[2] == Wall::Solid && scene.world.gravity[2] < 0.0;
         Self {
             camera,
             edges: box_edges(min, max, EDGES).into(),
@@ -132,19 +105,11 @@ impl Painter {
         let fast = (FAST * world.model().largest_speed) as f32;
         for r in &p.record[p.segment(Kind::Fluid)] {
             let speed = Vec3::from(r.v).length();
-            balls.push(Ball {
-                center: r.x.into(),
-                radius,
-                color: color::water((speed / fast).powf(SLOW)),
-            });
+            balls.push(Ball { center: r.x.into(), radius, color: color::water((speed / fast).powf(SLOW)) });
         }
         for i in p.segment(Kind::Rigid).chain(p.segment(Kind::Static)) {
             if let Look::Balls(color) = self.looks[p.owner[i] as usize] {
-                balls.push(Ball {
-                    center: p.record[i].x.into(),
-                    radius,
-                    color,
-                });
+                balls.push(Ball { center: p.record[i].x.into(), radius, color });
             }
         }
         for (body, look) in bodies.iter().zip(&self.looks) {
@@ -152,12 +117,7 @@ impl Painter {
                 shells.extend(own.iter().map(|f| moved(f, body.q, body.x)));
             }
         }
-        let options = Options {
-            facets: &shells,
-            lines: &self.edges,
-            ground: self.ground,
-            ..Options::default()
-        };
+        let options = Options { facets: &shells, lines: &self.edges, ground: self.ground, ..Options::default() };
         render(&balls, &self.camera, WIDTH, HEIGHT, &options)
     }
 }
@@ -165,22 +125,11 @@ impl Painter {
 /// Walls are not drawn; a body given as a mesh is drawn as that mesh, any other as its particles.
 fn looks(world: &World) -> Vec<Look> {
     let bodies = world.state().bodies.body.iter().zip(world.meshes());
-    let look = |(body, mesh): (
-        &jetsam::state::Body,
-        &Option<(std::sync::Arc<jetsam::mesh::Mesh>, DVec3)>,
-    )| {
-        let color = if body.is_static() {
-            STONE
-        } else {
-            color::of_name(&body.name)
-        };
+    let look = |(body, mesh): (&jetsam::state::Body, &Option<(std::sync::Arc<jetsam::mesh::Mesh>, DVec3)>)| {
+        let color = if body.is_static() { STONE } else { color::of_name(&body.name) };
         match mesh {
             Some((mesh, center)) => {
-                let vertices: Vec<Vec3> = mesh
-                    .vertices
-                    .iter()
-                    .map(|v| (*v - *center).as_vec3())
-                    .collect();
+                let vertices: Vec<Vec3> = mesh.vertices.iter().map(|v| (*v - *center).as_vec3()).collect();
                 Look::Mesh(facets(&vertices, &mesh.triangles, color))
             }
             None if body.is_static() && body.name == "walls" => Look::Hidden,
@@ -193,9 +142,7 @@ fn looks(world: &World) -> Vec<Look> {
 fn moved(facet: &Facet, turn: DQuat, place: DVec3) -> Facet {
     let turn32 = turn.as_quat();
     Facet {
-        corners: facet
-            .corners
-            .map(|c| (turn * c.as_dvec3() + place).as_vec3()),
+        corners: facet.corners.map(|c| (turn * c.as_dvec3() + place).as_vec3()),
         normals: facet.normals.map(|n| turn32 * n),
         color: facet.color,
     }
@@ -205,39 +152,11 @@ fn moved(facet: &Facet, turn: DQuat, place: DVec3) -> Facet {
 pub fn of_points(points: &[DVec3], spacing: f64) -> Image {
     let radius = (0.5 * spacing) as f32;
     let tips = points.iter().map(|p| p.as_vec3());
-    let (min, max) = tips
-        .clone()
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| {
-            (lo.min(p), hi.max(p))
-        });
-    let (min, max) = if points.is_empty() {
-        (Vec3::ZERO, Vec3::ONE)
-    } else {
-        (min - radius, max + radius)
-    };
+    let (min, max) = tips.clone().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let (min, max) = if points.is_empty() { (Vec3::ZERO, Vec3::ONE) } else { (min - radius, max + radius) };
     let margin = 0.05 * (max - min);
-    let camera = Camera::framing(
-        min - margin,
-        max + margin,
-        Vec3::new(0.5, -1.0, 0.35),
-        0.5,
-        WIDTH as f32 / HEIGHT as f32,
-    );
-    let balls: Vec<Ball> = tips
-        .map(|center| Ball {
-            center,
-            radius,
-            color: color::of_name("mesh"),
-        })
-        .collect();
-    render(
-        &balls,
-        &camera,
-        WIDTH,
-        HEIGHT,
-        &Options {
-            ground: Some(min.z),
-            ..Options::default()
-        },
-    )
+    let camera =
+        Camera::framing(min - margin, max + margin, Vec3::new(0.5, -1.0, 0.35), 0.5, WIDTH as f32 / HEIGHT as f32);
+    let balls: Vec<Ball> = tips.map(|center| Ball { center, radius, color: color::of_name("mesh") }).collect();
+    render(&balls, &camera, WIDTH, HEIGHT, &Options { ground: Some(min.z), ..Options::default() })
 }

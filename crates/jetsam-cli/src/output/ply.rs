@@ -6,18 +6,11 @@ use std::io::{self, Write};
 
 /// The particles of a frame.
 pub fn write_particles(file: &mut impl Write, rows: &[Row], time: f64) -> io::Result<()> {
-    writeln!(
-        file,
-        "ply\nformat binary_little_endian 1.0\ncomment time {time} s\nelement vertex {}",
-        rows.len()
-    )?;
+    writeln!(file, "ply\nformat binary_little_endian 1.0\ncomment time {time} s\nelement vertex {}", rows.len())?;
     for name in NUMBERS {
         writeln!(file, "property float {name}")?;
     }
-    writeln!(
-        file,
-        "property uchar kind\nproperty uint owner\nproperty uint id\nend_header"
-    )?;
+    writeln!(file, "property uchar kind\nproperty uint owner\nproperty uint id\nend_header")?;
     for row in rows {
         for number in row.numbers {
             file.write_all(&number.to_le_bytes())?;
@@ -31,15 +24,8 @@ pub fn write_particles(file: &mut impl Write, rows: &[Row], time: f64) -> io::Re
 
 /// Bare points.
 pub fn write_points(file: &mut impl Write, points: &[DVec3]) -> io::Result<()> {
-    writeln!(
-        file,
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}",
-        points.len()
-    )?;
-    writeln!(
-        file,
-        "property float x\nproperty float y\nproperty float z\nend_header"
-    )?;
+    writeln!(file, "ply\nformat binary_little_endian 1.0\nelement vertex {}", points.len())?;
+    writeln!(file, "property float x\nproperty float y\nproperty float z\nend_header")?;
     for number in points.iter().flat_map(|p| p.as_vec3().to_array()) {
         file.write_all(&number.to_le_bytes())?;
     }

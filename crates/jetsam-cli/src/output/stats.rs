@@ -16,10 +16,7 @@ impl Stats {
     /// Opens it.
     pub fn create(folder: &Path) -> miette::Result<Self> {
         let path = folder.join("stats.jsonl");
-        Ok(Self {
-            file: create(&path)?,
-            path,
-        })
+        Ok(Self { file: create(&path)?, path })
     }
 }
 
@@ -27,9 +24,7 @@ impl Writer for Stats {
     fn write(&mut self, _: &World, stats: &FrameStats) -> miette::Result<()> {
         let line = serde_json::to_string(stats).expect("statistics are plain");
         // at once, so that a run can be watched
-        Ok(writeln!(self.file, "{line}")
-            .and_then(|()| self.file.flush())
-            .map_err(at(&self.path))?)
+        Ok(writeln!(self.file, "{line}").and_then(|()| self.file.flush()).map_err(at(&self.path))?)
     }
 
     fn finish(&mut self) -> miette::Result<()> {

@@ -32,34 +32,20 @@ impl Video {
         let ffmpeg = Command::new("ffmpeg")
             .args(["-y", "-loglevel", "error"])
             .args(input)
-            .args([
-                "-pix_fmt",
-                "yuv420p",
-                "-crf",
-                "18",
-                "-movflags",
-                "+faststart",
-            ])
+            .args(["-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"])
             .arg(&path)
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .spawn()
             .map_err(|e| {
-                miette!(
-                    help = "install ffmpeg and put it on the PATH, or use --save png",
-                    "mp4 needs ffmpeg: {e}"
-                )
+                miette!(help = "install ffmpeg and put it on the PATH, or use --save png", "mp4 needs ffmpeg: {e}")
             })?;
         Ok(Self { path, ffmpeg })
     }
 
     /// Adds a picture.
     pub fn write(&mut self, image: &Image) -> miette::Result<()> {
-        let mut pipe = self
-            .ffmpeg
-            .stdin
-            .as_ref()
-            .expect("the pipe is open until the end");
+        let mut pipe = self.ffmpeg.stdin.as_ref().expect("the pipe is open until the end");
         Ok(pipe.write_all(&image.rgba).map_err(at(&self.path))?)
     }
 
@@ -70,9 +56,6 @@ impl Video {
         if status.success() {
             return Ok(());
         }
-        Err(miette!(
-            help = "its own message is above; --save png works without it",
-            "ffmpeg ended with {status}"
-        ))
+        Err(miette!(help = "its own message is above; --save png works without it", "ffmpeg ended with {status}"))
     }
 }

@@ -6,10 +6,7 @@ use std::io::{self, Write};
 /// The particles of a frame.
 pub fn write_particles(file: &mut impl Write, rows: &[Row], time: f64) -> io::Result<()> {
     let n = rows.len();
-    writeln!(
-        file,
-        "# vtk DataFile Version 3.0\njetsam, time {time} s\nBINARY\nDATASET POLYDATA"
-    )?;
+    writeln!(file, "# vtk DataFile Version 3.0\njetsam, time {time} s\nBINARY\nDATASET POLYDATA")?;
     writeln!(file, "POINTS {n} float")?;
     floats(file, rows, 0..3)?;
     writeln!(file, "\nVERTICES {n} {}", 2 * n)?;
@@ -24,10 +21,7 @@ pub fn write_particles(file: &mut impl Write, rows: &[Row], time: f64) -> io::Re
         floats(file, rows, at..at + 1)?;
     }
     for (name, which) in [("kind", 0), ("owner", 1), ("id", 2)] {
-        writeln!(
-            file,
-            "\nSCALARS {name} unsigned_int 1\nLOOKUP_TABLE default"
-        )?;
+        writeln!(file, "\nSCALARS {name} unsigned_int 1\nLOOKUP_TABLE default")?;
         for row in rows {
             let value = [row.kind.into(), row.owner, row.id][which];
             file.write_all(&value.to_be_bytes())?;

@@ -13,24 +13,18 @@ pub struct Solid {
 impl Solid {
     /// The three corners of each triangle.
     fn corners(&self) -> impl Iterator<Item = [DVec3; 3]> {
-        self.triangles
-            .iter()
-            .map(|t| t.map(|i| self.vertices[i as usize]))
+        self.triangles.iter().map(|t| t.map(|i| self.vertices[i as usize]))
     }
 
     /// Enclosed volume by the divergence theorem: positive when the triangles face outward.
     pub fn volume(&self) -> f64 {
-        self.corners()
-            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
-            .sum()
+        self.corners().map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
     }
 
     /// Lower and upper corner of the bounding box.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        self.vertices
-            .iter()
-            .fold(empty, |(low, high), v| (low.min(*v), high.max(*v)))
+        self.vertices.iter().fold(empty, |(low, high), v| (low.min(*v), high.max(*v)))
     }
 
     /// Whether the mesh is one closed, consistently oriented 2-manifold without slivers; the error says what is wrong.
@@ -43,16 +37,11 @@ impl Solid {
             let [a, b, c] = *triangle;
             for (from, to, opposite) in [(a, b, c), (b, c, a), (c, a, b)] {
                 if next.insert((from, to), opposite).is_some() {
-                    return Err(format!(
-                        "triangle {t}: edge {from}-{to} occurs twice in the same direction"
-                    ));
+                    return Err(format!("triangle {t}: edge {from}-{to} occurs twice in the same direction"));
                 }
             }
         }
-        if let Some((from, to)) = next
-            .keys()
-            .find(|(from, to)| !next.contains_key(&(*to, *from)))
-        {
+        if let Some((from, to)) = next.keys().find(|(from, to)| !next.contains_key(&(*to, *from))) {
             return Err(format!("edge {from}-{to} is open"));
         }
 
@@ -75,8 +64,7 @@ impl Solid {
 
         // Neighbours of vertex 0, their neighbours, and so on: all there is, if the mesh is one piece.
         let mut neighbours = vec![Vec::new(); self.vertices.len()];
-        next.keys()
-            .for_each(|(from, to)| neighbours[*from as usize].push(*to));
+        next.keys().for_each(|(from, to)| neighbours[*from as usize].push(*to));
         let (mut reached, mut queue) = (vec![false; self.vertices.len()], vec![0]);
         while let Some(v) = queue.pop() {
             if !std::mem::replace(&mut reached[v as usize], true) {
@@ -89,10 +77,7 @@ impl Solid {
 
         // A triangle's least height against its longest edge: 0.87 for an equilateral one.
         for (t, [a, b, c]) in self.corners().enumerate() {
-            let longest = [b - a, c - b, a - c]
-                .map(|e| e.length_squared())
-                .into_iter()
-                .fold(0.0, f64::max);
+            let longest = [b - a, c - b, a - c].map(|e| e.length_squared()).into_iter().fold(0.0, f64::max);
             if (b - a).cross(c - a).length() < 0.01 * longest {
                 return Err(format!("triangle {t} is a sliver"));
             }
@@ -104,20 +89,11 @@ impl Solid {
     }
 
     /// Checks the mesh, writes it as Wavefront OBJ with `decimals` decimals below the comment `title`, and prints its figures.
-    pub fn save_obj(
-        &self,
-        path: &str,
-        title: &str,
-        decimals: usize,
-    ) -> Result<(), Box<dyn std::error::Error>> {
+    pub fn save_obj(&self, path: &str, title: &str, decimals: usize) -> Result<(), Box<dyn std::error::Error>> {
         self.check()?;
         let mut text = format!("# {title}\n");
         for v in &self.vertices {
-            writeln!(
-                text,
-                "v {:.decimals$} {:.decimals$} {:.decimals$}",
-                v.x, v.y, v.z
-            )?;
+            writeln!(text, "v {:.decimals$} {:.decimals$} {:.decimals$}", v.x, v.y, v.z)?;
         }
         for [a, b, c] in &self.triangles {
             writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1)?;
@@ -126,14 +102,8 @@ impl Solid {
 
         let (low, high) = self.bounds();
         let (triangles, vertices) = (self.triangles.len(), self.vertices.len());
-        println!(
-            "{path}: {triangles} triangles, {vertices} vertices, {} bytes",
-            text.len()
-        );
-        println!(
-            "  volume {:.5}, from {low:.3} to {high:.3}, watertight",
-            self.volume()
-        );
+        println!("{path}: {triangles} triangles, {vertices} vertices, {} bytes", text.len());
+        println!("  volume {:.5}, from {low:.3} to {high:.3}, watertight", self.volume());
         Ok(())
     }
 }

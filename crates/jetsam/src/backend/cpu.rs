@@ -73,8 +73,7 @@ impl Backend for Cpu {
         self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
         self.share = vec![0.0; state.particles.record.len()];
         self.parts = bodies::parts(&state.bodies.body);
-        self.particle_mass =
-            state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
+        self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
         self.ledger = Ledger::default();
         self.static_copies = 0;
         self.state = state;
@@ -216,15 +215,13 @@ impl Cpu {
             chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
             let members = |c: usize| first + c * CHUNK..first + ((c + 1) * CHUNK).min(n);
             if kind == Kind::Fluid {
-                chunks.par_iter_mut().zip(chunks_mut!(p.density, ..n)).enumerate().for_each(
-                    |(c, (chunk, density))| {
-                        with_scratch(|scratch| {
-                            dispatch!(level, simd => {
-                                density::fluid_chunk(simd, scratch, model, around, members(c), chunk, density);
-                            });
+                chunks.par_iter_mut().zip(chunks_mut!(p.density, ..n)).enumerate().for_each(|(c, (chunk, density))| {
+                    with_scratch(|scratch| {
+                        dispatch!(level, simd => {
+                            density::fluid_chunk(simd, scratch, model, around, members(c), chunk, density);
                         });
-                    },
-                );
+                    });
+                });
             } else {
                 chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
                     with_scratch(|scratch| {

@@ -30,13 +30,7 @@ pub fn drift(
 }
 
 /// Kick: the prediction corrected by half the change of acceleration.
-pub fn kick(
-    integrator: Integrator,
-    advance: Advance,
-    records: &mut [Record],
-    push: &[[f32; 3]],
-    before: &[[f32; 3]],
-) {
+pub fn kick(integrator: Integrator, advance: Advance, records: &mut [Record], push: &[[f32; 3]], before: &[[f32; 3]]) {
     let half = 0.5 * advance.dt as f32;
     let keep = (-advance.drag * advance.dt).exp() as f32;
     for ((r, a), b) in records.iter_mut().zip(push).zip(before) {

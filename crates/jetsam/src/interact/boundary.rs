@@ -48,9 +48,7 @@ pub fn chunk<S: Simd>(
             let rho: Lanes = if model.fluids.len() == 1 {
                 [model.fluids[0].density; LANES]
             } else {
-                std::array::from_fn(|l| {
-                    model.fluids.get(owner[list[l] as usize] as usize).map_or(0.0, |f| f.density)
-                })
+                std::array::from_fn(|l| model.fluids.get(owner[list[l] as usize] as usize).map_or(0.0, |f| f.density))
             };
             for l in 0..LANES {
                 // from the fluid particle to this one: -d

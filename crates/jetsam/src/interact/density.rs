@@ -32,17 +32,25 @@ pub fn fluid_chunk<S: Simd>(
         Coupling::Spring => &[Kind::Static],
     };
     let start = members.start;
-    chunk.find(simd, scratch, around, Kind::Fluid, members, #[inline(always)] |cell, runs, list, r_sq, base| {
-        for (i, runs) in cell.zip(runs) {
-            let mut total = volume * sum_w(simd, kernel, inverse, r_sq, shifted(runs, Kind::Fluid, base));
-            for &kind in bodies {
-                if runs.count(kind) > 0 {
-                    total += sum_vw(simd, kernel, inverse, r_sq, list, runs.padded(kind), base, around.records);
+    chunk.find(
+        simd,
+        scratch,
+        around,
+        Kind::Fluid,
+        members,
+        #[inline(always)]
+        |cell, runs, list, r_sq, base| {
+            for (i, runs) in cell.zip(runs) {
+                let mut total = volume * sum_w(simd, kernel, inverse, r_sq, shifted(runs, Kind::Fluid, base));
+                for &kind in bodies {
+                    if runs.count(kind) > 0 {
+                        total += sum_vw(simd, kernel, inverse, r_sq, list, runs.padded(kind), base, around.records);
+                    }
                 }
+                density[i - start] = factor * total;
             }
-            density[i - start] = factor * total;
-        }
-    });
+        },
+    );
 }
 
 /// Neighbours of a chunk of bodies' particles.
@@ -108,7 +116,12 @@ pub fn weights(kernel: Kernel, inverse: f32, r_sq: &Lanes) -> Lanes {
     for l in 0..LANES {
         s[l] = r_sq[l].sqrt() * inverse;
     }
-    each_lane(kernel, &s, #[inline(always)] |k, s| k.w(s))
+    each_lane(
+        kernel,
+        &s,
+        #[inline(always)]
+        |k, s| k.w(s),
+    )
 }
 
 /// A kernel function on sixteen lanes: the choice of kernel is made outside the lane loop.

@@ -87,9 +87,8 @@ fn on_fluid<S: Simd>(simd: S, input: &Input, chunk: &NeighbourChunk, runs: &Runs
             }
         }
         Coupling::Spring => {
-            contacts = sum_contacts(input, own, &chunk.list[runs.exact(Kind::Rigid)], |body| {
-                model.coupling_pair(owner, body)
-            });
+            contacts =
+                sum_contacts(input, own, &chunk.list[runs.exact(Kind::Rigid)], |body| model.coupling_pair(owner, body));
         }
     }
     let mut acceleration = (pairs.force(simd) + contacts) / me.mass + model.gravity_f32();
@@ -161,9 +160,7 @@ pub fn fields(model: &Model, own: &Record) -> Vec3 {
     for force in &model.fields {
         let away = |center: [f64; 3]| wrap(model, Vec3::from(own.x) - single(center)).to_array();
         let a = match *force {
-            Force::Point { center, strength, core } => {
-                field::point_gravity(away(center), strength as f32, core as f32)
-            }
+            Force::Point { center, strength, core } => field::point_gravity(away(center), strength as f32, core as f32),
             Force::Wind { velocity, rate } => field::wind(own.v, single(velocity).to_array(), rate as f32),
             Force::Vortex { center, axis, speed, core, rate } => {
                 let axis = single(axis).normalize_or_zero().to_array();
@@ -276,7 +273,12 @@ impl<'a> Pairs<'a> {
         for l in 0..LANES {
             s[l] = r_sq[l].sqrt() * self.inverse;
         }
-        let shape = each_lane(self.kernel, &s, #[inline(always)] |k, s| k.g(s));
+        let shape = each_lane(
+            self.kernel,
+            &s,
+            #[inline(always)]
+            |k, s| k.g(s),
+        );
         let (mut along_d, mut along_v) = ([0.0; LANES], [0.0; LANES]);
         for l in 0..LANES {
             let g = self.g_factor * shape[l];
@@ -287,7 +289,12 @@ impl<'a> Pairs<'a> {
             along_v[l] = fluid::viscosity_laminar(volumes, mu_sum[l], r_sq[l], self.softening, g);
         }
         if let Some(factor) = self.mueller {
-            let laplacian = each_lane(Kernel::Viscosity, &s, #[inline(always)] |k, s| k.g(s));
+            let laplacian = each_lane(
+                Kernel::Viscosity,
+                &s,
+                #[inline(always)]
+                |k, s| k.g(s),
+            );
             for l in 0..LANES {
                 let volumes = own.volume * other.volume[l];
                 along_v[l] = fluid::viscosity_mueller(volumes, mu_sum[l], factor * laplacian[l]);

@@ -68,26 +68,55 @@ impl KernelSet {
 
 impl Kernel {
     /// Every kernel there is.
-    pub const ALL: [Kernel; 7] = [
-        Self::Cubic,
-        Self::WendlandC2,
-        Self::WendlandC4,
-        Self::Quintic,
-        Self::Poly6,
-        Self::Spiky,
-        Self::Viscosity,
-    ];
+    pub const ALL: [Kernel; 7] =
+        [Self::Cubic, Self::WendlandC2, Self::WendlandC4, Self::Quintic, Self::Poly6, Self::Spiky, Self::Viscosity];
 
     /// Norm of `W` for `H = 1` in `dimensions` (2 or 3).
     pub fn norm(self, dimensions: u32) -> f64 {
         let three = dimensions == 3;
         match self {
-            Self::Cubic => if three { 8.0 / PI } else { 40.0 / (7.0 * PI) },
-            Self::WendlandC2 => if three { 21.0 / (2.0 * PI) } else { 7.0 / PI },
-            Self::WendlandC4 => if three { 495.0 / (32.0 * PI) } else { 9.0 / PI },
-            Self::Quintic => if three { 27.0 / (120.0 * PI) } else { 63.0 / (478.0 * PI) },
-            Self::Poly6 => if three { 315.0 / (64.0 * PI) } else { 4.0 / PI },
-            Self::Spiky => if three { 15.0 / PI } else { 10.0 / PI },
+            Self::Cubic => {
+                if three {
+                    8.0 / PI
+                } else {
+                    40.0 / (7.0 * PI)
+                }
+            }
+            Self::WendlandC2 => {
+                if three {
+                    21.0 / (2.0 * PI)
+                } else {
+                    7.0 / PI
+                }
+            }
+            Self::WendlandC4 => {
+                if three {
+                    495.0 / (32.0 * PI)
+                } else {
+                    9.0 / PI
+                }
+            }
+            Self::Quintic => {
+                if three {
+                    27.0 / (120.0 * PI)
+                } else {
+                    63.0 / (478.0 * PI)
+                }
+            }
+            Self::Poly6 => {
+                if three {
+                    315.0 / (64.0 * PI)
+                } else {
+                    4.0 / PI
+                }
+            }
+            Self::Spiky => {
+                if three {
+                    15.0 / PI
+                } else {
+                    10.0 / PI
+                }
+            }
             Self::Viscosity => 15.0 / (2.0 * PI),
         }
     }

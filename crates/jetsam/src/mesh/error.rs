@@ -66,23 +66,25 @@ pub enum MeshFault {
 impl MeshFault {
     /// The error for the mesh called `name`.
     pub fn of(self, name: impl Into<String>) -> MeshError {
-        MeshError {
-            name: name.into(),
-            help: self.remedy(),
-            fault: self,
-        }
+        MeshError { name: name.into(), help: self.remedy(), fault: self }
     }
 
     /// What the user can do about it.
     pub fn remedy(&self) -> String {
         match self {
-            MeshFault::Unreadable(_) => "check the path (paths in a scene are relative to the scene file) and its permissions".into(),
+            MeshFault::Unreadable(_) => {
+                "check the path (paths in a scene are relative to the scene file) and its permissions".into()
+            }
             MeshFault::UnknownFormat(_) => "export the model as OBJ, STL, PLY, glTF or GLB, with that extension".into(),
-            MeshFault::Malformed { .. } => "export the model again; a text editor shows whether a download was cut short".into(),
+            MeshFault::Malformed { .. } => {
+                "export the model again; a text editor shows whether a download was cut short".into()
+            }
             MeshFault::TooLarge { .. } => "decimate the model, or split it into several files".into(),
             MeshFault::NotFinite { .. } => "delete the broken vertices in a modeller and export again".into(),
             MeshFault::IndexOutOfRange { .. } => "the file is damaged or cut short: export the model again".into(),
-            MeshFault::Empty => "export faces, not only points, lines or curves (apply modifiers, convert curves to a mesh)".into(),
+            MeshFault::Empty => {
+                "export faces, not only points, lines or curves (apply modifiers, convert curves to a mesh)".into()
+            }
         }
     }
 }

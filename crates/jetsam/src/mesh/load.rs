@@ -39,11 +39,7 @@ pub enum MeshFormat {
 impl MeshFormat {
     /// The format a file name stands for, by its extension.
     pub fn of(path: &Path) -> Result<MeshFormat, MeshFault> {
-        let extension = path
-            .extension()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .to_lowercase();
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         match extension.as_str() {
             "obj" => Ok(MeshFormat::Obj),
             "stl" => Ok(MeshFormat::Stl),
@@ -64,11 +60,7 @@ impl Mesh {
         let read = || {
             let format = MeshFormat::of(path)?;
             let unreadable = |e: std::io::Error| MeshFault::Unreadable(e.to_string());
-            at_most(
-                "bytes",
-                std::fs::metadata(path).map_err(unreadable)?.len(),
-                limits::BYTES,
-            )?;
+            at_most("bytes", std::fs::metadata(path).map_err(unreadable)?.len(), limits::BYTES)?;
             let bytes = std::fs::read(path).map_err(unreadable)?;
             parse(format, &bytes, path.parent())
         };
@@ -100,11 +92,7 @@ fn parse(format: MeshFormat, bytes: &[u8], folder: Option<&Path>) -> Result<Mesh
 }
 
 pub(super) fn at_most(what: &'static str, count: u64, limit: u64) -> Result<(), MeshFault> {
-    if count > limit {
-        Err(MeshFault::TooLarge { what, count, limit })
-    } else {
-        Ok(())
-    }
+    if count > limit { Err(MeshFault::TooLarge { what, count, limit }) } else { Ok(()) }
 }
 
 pub(super) fn malformed(format: &'static str) -> impl Fn(String) -> MeshFault {
@@ -112,41 +100,23 @@ pub(super) fn malformed(format: &'static str) -> impl Fn(String) -> MeshFault {
 }
 
 fn obj(bytes: &[u8]) -> Result<Mesh, MeshFault> {
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
-    };
+    let options =
+        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
     let no_materials = |_: &Path| Ok(Default::default());
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
         .map_err(|e| malformed("OBJ")(e.to_string()))?;
     let mut mesh = Mesh::default();
     for tobj::Model { mesh: part, .. } in models {
         let base = mesh.vertices.len() as u32;
-        mesh.vertices.extend(
-            part.positions
-                .as_chunks::<3>()
-                .0
-                .iter()
-                .map(|p| DVec3::from_array(p.map(f64::from))),
-        );
-        mesh.triangles.extend(
-            part.indices
-                .as_chunks::<3>()
-                .0
-                .iter()
-                .map(|t| t.map(|v| v.saturating_add(base))),
-        );
+        mesh.vertices.extend(part.positions.as_chunks::<3>().0.iter().map(|p| DVec3::from_array(p.map(f64::from))));
+        mesh.triangles.extend(part.indices.as_chunks::<3>().0.iter().map(|t| t.map(|v| v.saturating_add(base))));
     }
     Ok(mesh)
 }
 
 fn stl(bytes: &[u8]) -> Result<Mesh, MeshFault> {
     // Many binary files begin with the word that marks text: the length tells them apart.
-    let count = bytes.get(80..84).map_or(0, |n| {
-        u64::from(u32::from_le_bytes([n[0], n[1], n[2], n[3]]))
-    });
+    let count = bytes.get(80..84).map_or(0, |n| u64::from(u32::from_le_bytes([n[0], n[1], n[2], n[3]])));
     let mut owned = Vec::new();
     let mut data = bytes;
     if bytes.len() as u64 == 84 + 50 * count && bytes.starts_with(b"solid") {
@@ -154,19 +124,10 @@ fn stl(bytes: &[u8]) -> Result<Mesh, MeshFault> {
         owned[..5].fill(b' ');
         data = &owned;
     }
-    let read =
-        stl_io::read_stl(&mut Cursor::new(data)).map_err(|e| malformed("STL")(e.to_string()))?;
+    let read = stl_io::read_stl(&mut Cursor::new(data)).map_err(|e| malformed("STL")(e.to_string()))?;
     Ok(Mesh {
-        vertices: read
-            .vertices
-            .iter()
-            .map(|v| DVec3::from_array(v.0.map(f64::from)))
-            .collect(),
-        triangles: read
-            .faces
-            .iter()
-            .map(|f| f.vertices.map(|v| v as u32))
-            .collect(),
+        vertices: read.vertices.iter().map(|v| DVec3::from_array(v.0.map(f64::from))).collect(),
+        triangles: read.faces.iter().map(|f| f.vertices.map(|v| v as u32)).collect(),
     })
 }
 
@@ -215,49 +176,25 @@ fn ply(bytes: &[u8]) -> Result<Mesh, MeshFault> {
     let fault = malformed("PLY");
     let parser = Parser::<PlyItem>::new();
     let mut reader = Reader::new(Cursor::new(bytes));
-    let header = parser
-        .read_header(&mut reader)
-        .map_err(|e| fault(e.to_string()))?;
+    let header = parser.read_header(&mut reader).map_err(|e| fault(e.to_string()))?;
     for (name, element) in &header.elements {
         // Every element takes at least a byte, so a count beyond the file's length is a lie.
         if element.count > bytes.len() || element.properties.is_empty() && element.count > 0 {
-            return Err(fault(format!(
-                "{} elements {name:?} in {} bytes",
-                element.count,
-                bytes.len()
-            )));
+            return Err(fault(format!("{} elements {name:?} in {} bytes", element.count, bytes.len())));
         }
     }
-    for (name, property) in [
-        ("vertex", "x"),
-        ("vertex", "y"),
-        ("vertex", "z"),
-        ("face", "vertex_ind"),
-    ] {
-        let found = header
-            .elements
-            .get(name)
-            .is_some_and(|e| e.properties.keys().any(|k| k.starts_with(property)));
+    for (name, property) in [("vertex", "x"), ("vertex", "y"), ("vertex", "z"), ("face", "vertex_ind")] {
+        let found = header.elements.get(name).is_some_and(|e| e.properties.keys().any(|k| k.starts_with(property)));
         if !found {
-            return Err(fault(format!(
-                "element {name:?} has no property {property:?}"
-            )));
+            return Err(fault(format!("element {name:?} has no property {property:?}")));
         }
     }
-    let payload = parser
-        .read_payload(&mut reader, &header)
-        .map_err(|e| fault(e.to_string()))?;
+    let payload = parser.read_payload(&mut reader, &header).map_err(|e| fault(e.to_string()))?;
     let of = |name: &str| payload.get(name).map_or(&[][..], Vec::as_slice);
-    let vertices = of("vertex")
-        .iter()
-        .map(|v| DVec3::from_array(v.position))
-        .collect();
+    let vertices = of("vertex").iter().map(|v| DVec3::from_array(v.position)).collect();
     let fan = |p: &PlyItem| {
         let p = p.polygon.clone();
         (2..p.len()).map(move |i| [p[0], p[i - 1], p[i]])
     };
-    Ok(Mesh {
-        vertices,
-        triangles: of("face").iter().flat_map(fan).collect(),
-    })
+    Ok(Mesh { vertices, triangles: of("face").iter().flat_map(fan).collect() })
 }

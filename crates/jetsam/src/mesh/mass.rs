@@ -22,32 +22,17 @@ pub struct MassProperties {
 
 impl MassProperties {
     /// From the integrals over the solid of 1, of d and of d dᵀ, with d = x - `base`.
-    pub(crate) fn from_moments(
-        base: DVec3,
-        volume: f64,
-        first: DVec3,
-        second: DMat3,
-    ) -> MassProperties {
-        let d = if volume == 0.0 {
-            DVec3::ZERO
-        } else {
-            first / volume
-        };
+    pub(crate) fn from_moments(base: DVec3, volume: f64, first: DVec3, second: DMat3) -> MassProperties {
+        let d = if volume == 0.0 { DVec3::ZERO } else { first / volume };
         let central = second - outer(d, d) * volume;
         let trace = central.x_axis.x + central.y_axis.y + central.z_axis.z;
-        MassProperties {
-            volume,
-            com: base + d,
-            inertia: DMat3::IDENTITY * trace - central,
-        }
+        MassProperties { volume, com: base + d, inertia: DMat3::IDENTITY * trace - central }
     }
 
     /// The tensor as `[xx, yy, zz, xy, xz, yz]`.
     pub fn inertia6(&self) -> [f64; 6] {
         let m = self.inertia;
-        [
-            m.x_axis.x, m.y_axis.y, m.z_axis.z, m.y_axis.x, m.z_axis.x, m.z_axis.y,
-        ]
+        [m.x_axis.x, m.y_axis.y, m.z_axis.z, m.y_axis.x, m.z_axis.x, m.z_axis.y]
     }
 }
 
@@ -61,11 +46,7 @@ impl Mesh {
     /// parts count as often as they overlap; inverted parts count negative.
     pub fn mass_properties(&self) -> MassProperties {
         let Some((lo, hi)) = self.bounds() else {
-            return MassProperties {
-                volume: 0.0,
-                com: DVec3::ZERO,
-                inertia: DMat3::ZERO,
-            };
+            return MassProperties { volume: 0.0, com: DVec3::ZERO, inertia: DMat3::ZERO };
         };
         let base = 0.5 * (lo + hi);
         let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);

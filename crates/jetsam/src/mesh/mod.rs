@@ -45,16 +45,8 @@ impl Mesh {
     pub fn transformed(&self, map: DAffine3) -> Mesh {
         let mirrored = map.matrix3.determinant() < 0.0;
         Mesh {
-            vertices: self
-                .vertices
-                .iter()
-                .map(|v| map.transform_point3(*v))
-                .collect(),
-            triangles: self
-                .triangles
-                .iter()
-                .map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] })
-                .collect(),
+            vertices: self.vertices.iter().map(|v| map.transform_point3(*v)).collect(),
+            triangles: self.triangles.iter().map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] }).collect(),
         }
     }
 
@@ -62,17 +54,13 @@ impl Mesh {
     pub fn merged(mut self, other: &Mesh) -> Mesh {
         let base = self.vertices.len() as u32;
         self.vertices.extend_from_slice(&other.vertices);
-        self.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|v| v + base)));
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + base)));
         self
     }
 
     /// The same surface with every triangle turned inside out.
     pub fn inverted(&self) -> Mesh {
-        Mesh {
-            vertices: self.vertices.clone(),
-            triangles: self.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(),
-        }
+        Mesh { vertices: self.vertices.clone(), triangles: self.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect() }
     }
 
     /// Total area of the triangles.
@@ -97,11 +85,7 @@ impl Mesh {
         if let Some(vertex) = self.vertices.iter().position(|v| !v.is_finite()) {
             return Err(MeshFault::NotFinite { vertex });
         }
-        match self
-            .triangles
-            .iter()
-            .position(|t| t.iter().any(|&v| v as usize >= vertices))
-        {
+        match self.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= vertices)) {
             Some(triangle) => Err(MeshFault::IndexOutOfRange { triangle, vertices }),
             None if self.triangles.is_empty() => Err(MeshFault::Empty),
             None => Ok(()),

@@ -12,54 +12,19 @@ impl Mesh {
     pub fn cuboid(lo: DVec3, hi: DVec3) -> Mesh {
         let pick = |bit: usize, l: f64, h: f64| if bit == 0 { l } else { h };
         let vertices = (0..8)
-            .map(|i| {
-                DVec3::new(
-                    pick(i & 1, lo.x, hi.x),
-                    pick(i & 2, lo.y, hi.y),
-                    pick(i & 4, lo.z, hi.z),
-                )
-            })
+            .map(|i| DVec3::new(pick(i & 1, lo.x, hi.x), pick(i & 2, lo.y, hi.y), pick(i & 4, lo.z, hi.z)))
             .collect();
-        let quads: [[u32; 4]; 6] = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect();
-        Mesh {
-            vertices,
-            triangles,
-        }
+        let quads: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Mesh { vertices, triangles }
     }
 
     /// A regular octahedron with its corners at distance `radius` on the axes.
     pub fn octahedron(center: DVec3, radius: f64) -> Mesh {
-        let axes = [
-            DVec3::X,
-            DVec3::NEG_X,
-            DVec3::Y,
-            DVec3::NEG_Y,
-            DVec3::Z,
-            DVec3::NEG_Z,
-        ];
+        let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         Mesh {
             vertices: axes.iter().map(|a| center + *a * radius).collect(),
-            triangles: vec![
-                [0, 2, 4],
-                [2, 1, 4],
-                [1, 3, 4],
-                [3, 0, 4],
-                [2, 0, 5],
-                [1, 2, 5],
-                [3, 1, 5],
-                [0, 3, 5],
-            ],
+            triangles: vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
         }
     }
 
@@ -121,10 +86,7 @@ impl Mesh {
                 })
                 .collect();
         }
-        Mesh {
-            vertices: unit.iter().map(|v| center + *v * radius).collect(),
-            triangles,
-        }
+        Mesh { vertices: unit.iter().map(|v| center + *v * radius).collect(), triangles }
     }
 
     /// A closed cylinder along z from z = 0 to `height`, of `segments` sides.
@@ -136,17 +98,9 @@ impl Mesh {
             let rim = DVec2::from_angle(TAU * f64::from(i) / f64::from(n)) * radius;
             vertices.extend([rim.extend(0.0), rim.extend(height)]);
             let (a, b) = (2 + 2 * i, 2 + 2 * ((i + 1) % n));
-            triangles.extend([
-                [0, b, a],
-                [1, a + 1, b + 1],
-                [a, b, b + 1],
-                [a, b + 1, a + 1],
-            ]);
+            triangles.extend([[0, b, a], [1, a + 1, b + 1], [a, b, b + 1], [a, b + 1, a + 1]]);
         }
-        Mesh {
-            vertices,
-            triangles,
-        }
+        Mesh { vertices, triangles }
     }
 
     /// A torus about z: the tube of radius `minor` runs along a circle of radius `major`.
@@ -181,13 +135,10 @@ impl Mesh {
         let (rings, n) = (rings.max(2), segments.max(3));
         let at = |r: u32, s: u32| {
             let theta = open + (PI - open) * f64::from(r) / f64::from(rings);
-            (DVec2::from_angle(TAU * f64::from(s) / f64::from(n)) * theta.sin()).extend(theta.cos())
-                * radius
+            (DVec2::from_angle(TAU * f64::from(s) / f64::from(n)) * theta.sin()).extend(theta.cos()) * radius
         };
-        let mut vertices: Vec<DVec3> = (0..rings)
-            .flat_map(|r| (0..n).map(move |s| (r, s)))
-            .map(|(r, s)| at(r, s))
-            .collect();
+        let mut vertices: Vec<DVec3> =
+            (0..rings).flat_map(|r| (0..n).map(move |s| (r, s))).map(|(r, s)| at(r, s)).collect();
         vertices.push(DVec3::NEG_Z * radius);
         let (id, pole) = (|r: u32, s: u32| r * n + s % n, rings * n);
         let mut triangles = Vec::new();
@@ -198,35 +149,21 @@ impl Mesh {
             }
             triangles.push([id(rings - 1, s), pole, id(rings - 1, s + 1)]);
         }
-        Mesh {
-            vertices,
-            triangles,
-        }
+        Mesh { vertices, triangles }
     }
 
     /// The same triangles with no vertex shared: a soup.
     pub fn unwelded(&self) -> Mesh {
         Mesh {
-            vertices: self
-                .triangles
-                .iter()
-                .flat_map(|t| self.corners(*t))
-                .collect(),
-            triangles: (0..self.triangles.len() as u32)
-                .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
-                .collect(),
+            vertices: self.triangles.iter().flat_map(|t| self.corners(*t)).collect(),
+            triangles: (0..self.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
         }
     }
 }
 
 /// A closed tube of radius `radius` about a closed curve. `frame(t)`, t in [0, 1), gives the point and two unit
 /// vectors u, v across the curve, with u x v pointing against it.
-fn tube(
-    around: u32,
-    across: u32,
-    radius: f64,
-    frame: impl Fn(f64) -> (DVec3, DVec3, DVec3),
-) -> Mesh {
+fn tube(around: u32, across: u32, radius: f64, frame: impl Fn(f64) -> (DVec3, DVec3, DVec3)) -> Mesh {
     let (around, across) = (around.max(3), across.max(3));
     let mut mesh = Mesh::default();
     for i in 0..around {

@@ -42,11 +42,7 @@ impl Mesh {
     /// Says what is wrong with the mesh. Corners at exactly one place count as one vertex. A mesh that fails
     /// [`Mesh::check`] may not be passed in.
     pub fn report(&self) -> MeshReport {
-        let welded = weld(
-            self.vertices
-                .iter()
-                .map(|v| v.to_array().map(|x| (x + 0.0).to_bits() as i64)),
-        );
+        let welded = weld(self.vertices.iter().map(|v| v.to_array().map(|x| (x + 0.0).to_bits() as i64)));
         let triangles = distinct(&self.triangles, &welded);
         let topology = Topology::new(&triangles, &self.vertices);
         MeshReport {
@@ -68,9 +64,7 @@ impl Mesh {
 pub(crate) fn weld(keys: impl ExactSizeIterator<Item = [i64; 3]>) -> Vec<u32> {
     let mut seen: HashMap<[i64; 3], u32, BuildHasherDefault<KeyHasher>> =
         HashMap::with_capacity_and_hasher(keys.len(), BuildHasherDefault::default());
-    keys.zip(0..)
-        .map(|(key, index)| *seen.entry(key).or_insert(index))
-        .collect()
+    keys.zip(0..).map(|(key, index)| *seen.entry(key).or_insert(index)).collect()
 }
 
 /// A hash for vertex keys: multiply and fold; an attacker gains nothing but a slow load.
@@ -89,8 +83,7 @@ impl Hasher for KeyHasher {
         }
     }
     fn write_u64(&mut self, v: u64) {
-        let product =
-            u128::from(self.0 ^ v).wrapping_mul(0x9e37_79b9_7f4a_7c15_f39c_c060_5ced_c835);
+        let product = u128::from(self.0 ^ v).wrapping_mul(0x9e37_79b9_7f4a_7c15_f39c_c060_5ced_c835);
         self.0 = (product >> 64) as u64 ^ product as u64;
     }
     fn write_usize(&mut self, _: usize) {}
@@ -99,9 +92,7 @@ impl Hasher for KeyHasher {
 /// The triangles in welded indices, without those of fewer than three distinct corners.
 pub(crate) fn distinct(triangles: &[[u32; 3]], welded: &[u32]) -> Vec<[u32; 3]> {
     let mapped = triangles.iter().map(|t| t.map(|v| welded[v as usize]));
-    mapped
-        .filter(|[a, b, c]| a != b && b != c && c != a)
-        .collect()
+    mapped.filter(|[a, b, c]| a != b && b != c && c != a).collect()
 }
 
 /// One side of a triangle, stored with its lower vertex.
@@ -186,8 +177,7 @@ impl Topology {
         }
         for (&root, shell) in &mut shells {
             shell.twisted = forest.twisted[root as usize];
-            let minority = 2 * shell.against > shell.count
-                || 2 * shell.against == shell.count && shell.volume < 0.0;
+            let minority = 2 * shell.against > shell.count || 2 * shell.against == shell.count && shell.volume < 0.0;
             shell.turn = minority;
             if minority {
                 shell.against = shell.count - shell.against;
@@ -195,11 +185,7 @@ impl Topology {
             }
         }
         self.shells = shells.len();
-        self.flipped_triangles = shells
-            .values()
-            .filter(|s| !s.twisted)
-            .map(|s| s.against)
-            .sum();
+        self.flipped_triangles = shells.values().filter(|s| !s.twisted).map(|s| s.against).sum();
         self.turn_shells(triangles, at, &label, &mut shells);
         let turned = |&(root, against): &(u32, bool)| {
             let shell = &shells[&root];
@@ -219,11 +205,7 @@ impl Topology {
         label: &[(u32, bool)],
         shells: &mut HashMap<u32, Shell>,
     ) {
-        let mut roots: Vec<u32> = shells
-            .iter()
-            .filter(|(_, s)| s.closed && !s.twisted)
-            .map(|(r, _)| *r)
-            .collect();
+        let mut roots: Vec<u32> = shells.iter().filter(|(_, s)| s.closed && !s.twisted).map(|(r, _)| *r).collect();
         roots.sort_unstable();
         let work = roots.len() as u64 * triangles.len() as u64;
         if roots.iter().all(|r| shells[r].volume >= 0.0) || roots.len() > 1 && work > 200_000_000 {
@@ -241,17 +223,11 @@ impl Topology {
                     }
                 }
             }
-            angle
-                .iter()
-                .map(|sums| sums.iter().all(|s| s.abs() > std::f64::consts::TAU))
-                .collect()
+            angle.iter().map(|sums| sums.iter().all(|s| s.abs() > std::f64::consts::TAU)).collect()
         };
         // around[r][s]: whether shell s goes round shell r.
         let around: Vec<Vec<bool>> = roots.iter().map(within).collect();
-        let outermost: Vec<bool> = around
-            .iter()
-            .map(|a| a.iter().all(|inside| !inside))
-            .collect();
+        let outermost: Vec<bool> = around.iter().map(|a| a.iter().all(|inside| !inside)).collect();
         for (i, r) in roots.iter().enumerate() {
             let inverted = |k: usize| outermost[k] && shells[&roots[k]].volume < 0.0;
             let flip = inverted(i) || (0..roots.len()).any(|k| around[i][k] && inverted(k));
@@ -317,22 +293,11 @@ fn sides_by_vertex(triangles: &[[u32; 3]], vertices: usize) -> (Vec<u32>, Vec<Si
     for i in 2..start.len() {
         start[i] += start[i - 1];
     }
-    let mut sides = vec![
-        Side {
-            other: 0,
-            triangle: 0,
-            forward: false
-        };
-        3 * triangles.len()
-    ];
+    let mut sides = vec![Side { other: 0, triangle: 0, forward: false }; 3 * triangles.len()];
     for (i, t) in triangles.iter().enumerate() {
         for (a, b) in sides_of(t) {
             let slot = &mut start[a.min(b) as usize + 1];
-            sides[*slot as usize] = Side {
-                other: a.max(b),
-                triangle: i as u32,
-                forward: a < b,
-            };
+            sides[*slot as usize] = Side { other: a.max(b), triangle: i as u32, forward: a < b };
             *slot += 1;
         }
     }
@@ -367,11 +332,7 @@ struct Forest {
 
 impl Forest {
     fn new(n: usize) -> Forest {
-        Forest {
-            parent: (0..n as u32).collect(),
-            against: vec![false; n],
-            twisted: vec![false; n],
-        }
+        Forest { parent: (0..n as u32).collect(), against: vec![false; n], twisted: vec![false; n] }
     }
 
     /// The root of `i`, and whether `i` is turned against it. Halves the path on its way.

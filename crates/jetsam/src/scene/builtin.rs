@@ -47,7 +47,9 @@ impl Scene {
         let near = |s: &&Builtin| (strsim::jaro_winkler(name_or_path, s.name) * 1e6) as u64;
         let nearest = SCENES.iter().max_by_key(near).filter(|s| near(s) > 700_000);
         let help = match nearest {
-            Some(scene) => format!("did you mean `{}`? A scene file is given by its path, as in ./{name_or_path}.toml", scene.name),
+            Some(scene) => {
+                format!("did you mean `{}`? A scene file is given by its path, as in ./{name_or_path}.toml", scene.name)
+            }
             None => "`jetsam scenes` lists the built-in scenes; a scene file is given by its path".into(),
         };
         Err(Source::default().error("", format!("there is no built-in scene `{name_or_path}`"), help))

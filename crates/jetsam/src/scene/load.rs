@@ -179,10 +179,8 @@ fn set(table: &mut Table, one: &str) -> std::result::Result<(), (String, String)
         Err(_) => Value::String(text.trim().into()),
     };
     let parts: Vec<&str> = key.trim().split('.').collect();
-    let (last, parents) = parts.split_last().filter(|(l, _)| !l.is_empty()).ok_or((
-        format!("--set {one}: no key"),
-        usage.to_owned(),
-    ))?;
+    let (last, parents) =
+        parts.split_last().filter(|(l, _)| !l.is_empty()).ok_or((format!("--set {one}: no key"), usage.to_owned()))?;
     let mut root = Value::Table(std::mem::take(table));
     let mut at = &mut root;
     for part in parents {

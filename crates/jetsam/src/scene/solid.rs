@@ -140,10 +140,8 @@ impl Scene {
                 if points.is_empty() {
                     return Err(self.error(key, format!("`{key}` has no points"), "give at least one"));
                 }
-                let points: Vec<DVec3> = points
-                    .iter()
-                    .map(|&p| if flat { DVec3::new(p[0], 0.0, p[2]) } else { DVec3::from(p) })
-                    .collect();
+                let points: Vec<DVec3> =
+                    points.iter().map(|&p| if flat { DVec3::new(p[0], 0.0, p[2]) } else { DVec3::from(p) }).collect();
                 let cell = if flat { dx * dx } else { dx.powi(3) };
                 let n = points.len() as f64;
                 let center = points.iter().sum::<DVec3>() / n;
@@ -173,11 +171,8 @@ impl Scene {
         }
         let mesh = self.load_mesh(path, key)?.transformed(DAffine3::from_scale(DVec3::splat(scale)));
         let dx = self.resolution.spacing;
-        let options = VoxelizeOptions {
-            resolution: Resolution::Spacing(dx),
-            max_cells: 1 << 32,
-            ..VoxelizeOptions::default()
-        };
+        let options =
+            VoxelizeOptions { resolution: Resolution::Spacing(dx), max_cells: 1 << 32, ..VoxelizeOptions::default() };
         let voxels = voxelize(&mesh, &options).map_err(|e| {
             self.error(key, format!("`{key}` ({path}): {e}"), "choose another [resolution] spacing or scale")
         })?;

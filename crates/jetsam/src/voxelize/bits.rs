@@ -12,17 +12,12 @@ pub struct BitGrid {
 impl BitGrid {
     /// An empty grid of `dims` cells along x, y, z.
     pub fn new(dims: [u32; 3]) -> BitGrid {
-        BitGrid {
-            dims,
-            words: vec![0; BitGrid::words_for(dims) as usize],
-        }
+        BitGrid { dims, words: vec![0; BitGrid::words_for(dims) as usize] }
     }
 
     /// How many words of 8 bytes a grid takes.
     pub fn words_for([nx, ny, nz]: [u32; 3]) -> u64 {
-        u64::from(nx.div_ceil(64))
-            .saturating_mul(u64::from(ny))
-            .saturating_mul(u64::from(nz))
+        u64::from(nx.div_ceil(64)).saturating_mul(u64::from(ny)).saturating_mul(u64::from(nz))
     }
 
     /// Cells along x, y, z.
@@ -47,10 +42,7 @@ impl BitGrid {
 
     /// Takes all words anew.
     pub(crate) fn set_words(&mut self, words: impl Iterator<Item = u64>) {
-        self.words
-            .iter_mut()
-            .zip(words)
-            .for_each(|(word, new)| *word = new);
+        self.words.iter_mut().zip(words).for_each(|(word, new)| *word = new);
     }
 
     /// The row of cells with the given y and z index.
@@ -67,42 +59,29 @@ impl BitGrid {
 
     /// Whether the cell is set; false outside.
     pub fn get(&self, i: i64, j: i64, k: i64) -> bool {
-        let inside = [i, j, k]
-            .iter()
-            .zip(self.dims)
-            .all(|(c, n)| (0..i64::from(n)).contains(c));
+        let inside = [i, j, k].iter().zip(self.dims).all(|(c, n)| (0..i64::from(n)).contains(c));
         inside && self.row(j as u32, k as u32)[i as usize / 64] >> (i % 64) & 1 == 1
     }
 
     /// How many cells are set.
     pub fn count(&self) -> u64 {
-        self.words
-            .par_iter()
-            .map(|w| u64::from(w.count_ones()))
-            .sum()
+        self.words.par_iter().map(|w| u64::from(w.count_ones())).sum()
     }
 
     /// The indices of all set cells, x fastest.
     pub fn iter(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         let [_, ny, _] = self.dims;
         let per_row = self.row_words();
-        self.words
-            .iter()
-            .enumerate()
-            .filter(|(_, w)| **w != 0)
-            .flat_map(move |(at, &word)| {
-                let (row, first) = (at / per_row, (at % per_row) as u32 * 64);
-                let (j, k) = (row as u32 % ny, row as u32 / ny);
-                ones(word).map(move |bit| [first + bit, j, k])
-            })
+        self.words.iter().enumerate().filter(|(_, w)| **w != 0).flat_map(move |(at, &word)| {
+            let (row, first) = (at / per_row, (at % per_row) as u32 * 64);
+            let (j, k) = (row as u32 % ny, row as u32 / ny);
+            ones(word).map(move |bit| [first + bit, j, k])
+        })
     }
 
     /// `self`, `other` -> op(self, other), word by word. Both of the same size.
     pub fn combine(&mut self, other: &BitGrid, op: impl Fn(u64, u64) -> u64 + Sync) {
-        self.words
-            .par_iter_mut()
-            .zip(&other.words)
-            .for_each(|(a, b)| *a = op(*a, *b));
+        self.words.par_iter_mut().zip(&other.words).for_each(|(a, b)| *a = op(*a, *b));
     }
 
     /// The grid in which a cell is set if any cell at an offset in `reach` is set here. Row by row: `reach` lists,
@@ -209,11 +188,7 @@ mod tests {
         for m in [0, 1, 5, 64, 70] {
             let wide = grid.dilated(&[(0, 0, m), (1, 0, 0)], false);
             for i in 0..200i64 {
-                let near = |far: u32| {
-                    seeds
-                        .iter()
-                        .any(|s| (i - i64::from(s.0)).abs() <= i64::from(far))
-                };
+                let near = |far: u32| seeds.iter().any(|s| (i - i64::from(s.0)).abs() <= i64::from(far));
                 assert_eq!(wide.get(i, 1, 1), near(m), "{i} within {m}");
                 assert_eq!(wide.get(i, 0, 1), near(0), "{i} in the row below");
                 assert!(!wide.get(i, 2, 1) && !wide.get(i, 1, 0));

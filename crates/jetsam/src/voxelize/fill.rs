@@ -80,12 +80,8 @@ pub(crate) fn parity(shape: &Shape, grid: &mut BitGrid) -> Vec<u64> {
                 row[per_row - 1] &= !0 >> (64 - nx % 64);
             }
         }
-        let rows = odd
-            .iter()
-            .zip(0..)
-            .flat_map(|(w, at)| super::bits::ones(*w).map(move |bit| at * 64 + bit));
-        rows.map(|j| k as u64 * u64::from(ny) + u64::from(j))
-            .collect::<Vec<_>>()
+        let rows = odd.iter().zip(0..).flat_map(|(w, at)| super::bits::ones(*w).map(move |bit| at * 64 + bit));
+        rows.map(|j| k as u64 * u64::from(ny) + u64::from(j)).collect::<Vec<_>>()
     };
     grid.par_slices().map(fill).flatten_iter().collect()
 }
@@ -122,10 +118,7 @@ pub(crate) fn winding(shape: &Shape, rim: &Rim, grid: &mut BitGrid, only: Option
             let mine = rest.partition_point(|e| e.j == j as u32);
             let (here, after) = rest.split_at(mine);
             rest = after;
-            if only.is_some_and(|rows| {
-                rows.binary_search(&(k as u64 * u64::from(ny) + j as u64))
-                    .is_err()
-            }) {
+            if only.is_some_and(|rows| rows.binary_search(&(k as u64 * u64::from(ny) + j as u64)).is_err()) {
                 continue;
             }
             row.fill(0);
@@ -176,12 +169,7 @@ fn closed_row(events: &[Crossing], row: &mut [u64], nx: u32) -> i32 {
 }
 
 /// The winding number is whole but for the rim's part, which is asked for as seldom as its bound allows.
-fn open_row(
-    events: &[Crossing],
-    row: &mut [u64],
-    nx: u32,
-    offset: impl Fn(u32, i32) -> Offset,
-) -> i32 {
+fn open_row(events: &[Crossing], row: &mut [u64], nx: u32, offset: impl Fn(u32, i32) -> Offset) -> i32 {
     let (mut number, mut caps, mut next, mut at, mut highest) = (0, 0, 0, 0, 0);
     let pass = |upto: u32, next: &mut usize, number: &mut i32, caps: &mut i32| {
         while let Some(event) = events.get(*next).filter(|e| e.i <= upto) {

@@ -28,37 +28,20 @@ pub(crate) struct Placed {
 
 impl Placed {
     pub fn new(mesh: &Mesh, options: &VoxelizeOptions) -> Placed {
-        let placement =
-            DAffine3::from_rotation_translation(options.rotation.normalize(), options.offset);
+        let placement = DAffine3::from_rotation_translation(options.rotation.normalize(), options.offset);
         let (to_lattice, frame) = match options.align {
             Align::World => (placement, DAffine3::IDENTITY),
             Align::Body => (DAffine3::IDENTITY, placement),
         };
-        let corners = mesh
-            .triangles
-            .iter()
-            .flatten()
-            .map(|v| to_lattice.transform_point3(mesh.vertices[*v as usize]));
-        let (lo, hi) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), v| {
-            (lo.min(v), hi.max(v))
-        });
-        Placed {
-            to_lattice,
-            frame,
-            lo,
-            hi,
-        }
+        let corners = mesh.triangles.iter().flatten().map(|v| to_lattice.transform_point3(mesh.vertices[*v as usize]));
+        let (lo, hi) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
+        Placed { to_lattice, frame, lo, hi }
     }
 
     /// The lattice of the given spacing around the mesh. In the world, cell centres lie at odd multiples of half the
     /// spacing, wherever the mesh is. On a body, the lattice is centred on the body's box, with as many cells
     /// along each side as fit best; `shift` asks for one cell more or less along x, y, z (bits 1, 2, 4).
-    pub fn lattice(
-        &self,
-        spacing: f64,
-        shift: u8,
-        options: &VoxelizeOptions,
-    ) -> Result<Lattice, VoxelizeError> {
+    pub fn lattice(&self, spacing: f64, shift: u8, options: &VoxelizeOptions) -> Result<Lattice, VoxelizeError> {
         let margin = u32::from(options.thin);
         let (mut origin, mut dims) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {
@@ -66,20 +49,13 @@ impl Placed {
             let (first, count) = match options.align {
                 Align::World => {
                     let first = (lo / spacing).floor();
-                    (
-                        (first + 0.5) * spacing,
-                        (hi / spacing).floor() - first + 1.0,
-                    )
+                    ((first + 0.5) * spacing, (hi / spacing).floor() - first + 1.0)
                 }
                 Align::Body => {
                     let across = (hi - lo) / spacing;
                     let mut count = across.round().max(1.0);
                     if shift >> axis & 1 == 1 {
-                        count = if across >= count {
-                            count + 1.0
-                        } else {
-                            (count - 1.0).max(1.0)
-                        };
+                        count = if across >= count { count + 1.0 } else { (count - 1.0).max(1.0) };
                     }
                     (0.5 * (lo + hi) - 0.5 * (count - 1.0) * spacing, count)
                 }
@@ -97,18 +73,9 @@ impl Placed {
             let longest = (self.hi - self.lo).max_element();
             let shrink = (cells / options.max_cells as f64).cbrt().max(1.0);
             let fits = (spacing * shrink * 1.05).max(longest / (most - 4.0));
-            return Err(VoxelizeError::TooManyCells {
-                spacing,
-                cells,
-                limit: options.max_cells,
-                fits,
-            });
+            return Err(VoxelizeError::TooManyCells { spacing, cells, limit: options.max_cells, fits });
         }
-        Ok(Lattice {
-            spacing,
-            origin: origin.into(),
-            dims: dims.map(|d| d as u32),
-        })
+        Ok(Lattice { spacing, origin: origin.into(), dims: dims.map(|d| d as u32) })
     }
 }
 

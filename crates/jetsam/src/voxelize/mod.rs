@@ -103,29 +103,12 @@ pub fn voxelize(mesh: &Mesh, options: &VoxelizeOptions) -> Result<Voxels, Voxeli
     }
     let mut solid = match options.resolution {
         Resolution::Spacing(spacing) => attempt(mesh, &placed, options, spacing, 0)?,
-        Resolution::Across(cells) => {
-            attempt(mesh, &placed, options, longest / f64::from(cells), 0)?
-        }
+        Resolution::Across(cells) => attempt(mesh, &placed, options, longest / f64::from(cells), 0)?,
         Resolution::Particles(wanted) => search(mesh, &placed, options, wanted)?,
     };
     let report = report::write(mesh, &placed, options, &mut solid, started);
-    let Solid {
-        lattice: Lattice {
-            spacing,
-            origin,
-            dims,
-        },
-        bits,
-        ..
-    } = solid;
-    Ok(Voxels {
-        spacing,
-        origin,
-        dims,
-        bits,
-        frame: placed.frame,
-        report,
-    })
+    let Solid { lattice: Lattice { spacing, origin, dims }, bits, .. } = solid;
+    Ok(Voxels { spacing, origin, dims, bits, frame: placed.frame, report })
 }
 
 /// One filled lattice, and what was learnt on the way.
@@ -158,17 +141,10 @@ fn attempt(
     let mut triangles = topology::distinct(&mesh.triangles, &welded);
     let in_cells: Vec<DVec3> = vertices.iter().map(|v| rim::in_cells(*v)).collect();
     let topology = topology::Topology::new(&triangles, &in_cells);
-    for (t, _) in triangles
-        .iter_mut()
-        .zip(&topology.turn)
-        .filter(|(_, turn)| **turn)
-    {
+    for (t, _) in triangles.iter_mut().zip(&topology.turn).filter(|(_, turn)| **turn) {
         t.swap(1, 2);
     }
-    let shape = Shape {
-        vertices,
-        triangles,
-    };
+    let shape = Shape { vertices, triangles };
     let mut solid = Solid {
         bits: lattice.grid(),
         lattice,
@@ -182,9 +158,7 @@ fn attempt(
         mended_rows: 0,
     };
     match options.rule {
-        Rule::Winding => {
-            solid.overlap = fill::winding(&shape, &rim_of(&shape), &mut solid.bits, None)
-        }
+        Rule::Winding => solid.overlap = fill::winding(&shape, &rim_of(&shape), &mut solid.bits, None),
         Rule::Parity => {
             let odd = fill::parity(&shape, &mut solid.bits);
             solid.mended_rows = odd.len();
@@ -206,11 +180,7 @@ fn attempt(
 fn rim_of(shape: &Shape) -> Rim {
     let side = |(a, b, weight): (u32, u32, i32)| {
         let (a, b) = if weight > 0 { (a, b) } else { (b, a) };
-        Side {
-            a: shape.vertices[a as usize],
-            b: shape.vertices[b as usize],
-            weight: weight.abs(),
-        }
+        Side { a: shape.vertices[a as usize], b: shape.vertices[b as usize], weight: weight.abs() }
     };
     let sides = topology::uncancelled(&shape.triangles, shape.vertices.len());
     Rim::new(sides.into_iter().map(side).collect())
@@ -218,20 +188,11 @@ fn rim_of(shape: &Shape) -> Rim {
 
 /// Looks for the spacing that gives the wanted number of particles within 2 %. The number falls with the cube of the
 /// spacing but for the grain of the lattice; on a body the lattice can also be shifted by half a cell.
-fn search(
-    mesh: &Mesh,
-    placed: &Placed,
-    options: &VoxelizeOptions,
-    wanted: u64,
-) -> Result<Solid, VoxelizeError> {
+fn search(mesh: &Mesh, placed: &Placed, options: &VoxelizeOptions, wanted: u64) -> Result<Solid, VoxelizeError> {
     let goal = wanted as f64;
     let size = placed.hi - placed.lo;
     let volume = mesh.mass_properties().volume.abs();
-    let body = if volume > 0.0 {
-        volume
-    } else {
-        size.element_product()
-    };
+    let body = if volume > 0.0 { volume } else { size.element_product() };
     let mut spacing = (body / goal).cbrt();
     if spacing <= 0.0 {
         spacing = size.max_element() / goal.cbrt();
@@ -240,11 +201,7 @@ fn search(
     let mut best: Option<Solid> = None;
     for round in 0..40 {
         // Eight rounds of plain correction; then shifted lattices and small steps around the best.
-        let shift = if round < 8 || options.align == Align::World {
-            0
-        } else {
-            round % 8
-        };
+        let shift = if round < 8 || options.align == Align::World { 0 } else { round % 8 };
         if let Some(best) = best.as_ref().filter(|_| round >= 8) {
             let step = f64::from(round / 8) * 0.01 * if round % 2 == 0 { 1.0 } else { -1.0 };
             spacing = best.lattice.spacing * (1.0 + step);
@@ -252,11 +209,7 @@ fn search(
         let solid = attempt(mesh, placed, options, spacing, shift)?;
         let ratio = (solid.count.max(1) as f64 / goal).clamp(0.02, 50.0);
         // A shell's particles grow with the square of the resolution, not the cube.
-        spacing *= ratio.powf(if options.shell.is_some() {
-            0.4
-        } else {
-            1.0 / 3.0
-        });
+        spacing *= ratio.powf(if options.shell.is_some() { 0.4 } else { 1.0 / 3.0 });
         if best.as_ref().is_none_or(|b| error(&solid) < error(b)) {
             best = Some(solid);
         }

@@ -117,10 +117,7 @@ pub enum VoxelizeError {
     Mesh(MeshFault),
     /// All triangles lie in one point.
     #[error("the mesh has no extent")]
-    #[diagnostic(
-        code(jetsam::voxelize::point),
-        help("check the mesh's scale: all its vertices lie in one point")
-    )]
+    #[diagnostic(code(jetsam::voxelize::point), help("check the mesh's scale: all its vertices lie in one point"))]
     Point,
     /// An option is out of range.
     #[error("{option} = {value} must be positive and finite")]

@@ -75,17 +75,9 @@ impl Plane {
     fn new([a, b, c]: [Fixed; 3]) -> Plane {
         let edge = |p: Fixed| [0, 1, 2].map(|i| i128::from(p[i] - a[i]));
         let (u, v) = (edge(b), edge(c));
-        let normal = [
-            u[1] * v[2] - u[2] * v[1],
-            u[2] * v[0] - u[0] * v[2],
-            u[0] * v[1] - u[1] * v[0],
-        ];
+        let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
         let nx = normal[0] as f64;
-        Plane {
-            corner: a,
-            normal,
-            slope: [normal[1] as f64 / nx, normal[2] as f64 / nx],
-        }
+        Plane { corner: a, normal, slope: [normal[1] as f64 / nx, normal[2] as f64 / nx] }
     }
 
     /// The first cell of the row (y, z) at or beyond the plane. The row must pass through the triangle.
@@ -97,8 +89,7 @@ impl Plane {
         let guess = (self.corner[0] as f64 - by_y - by_z) / ONE as f64;
         certain_ceil(guess).filter(|_| trusted).unwrap_or_else(|| {
             let [nx, ny, nz] = self.normal;
-            let numerator =
-                i128::from(self.corner[0]) * nx - ny * i128::from(dy) - nz * i128::from(dz);
+            let numerator = i128::from(self.corner[0]) * nx - ny * i128::from(dy) - nz * i128::from(dz);
             ceil_ratio(numerator, nx * i128::from(ONE))
         })
     }
@@ -111,10 +102,6 @@ fn certain_ceil(x: f64) -> Option<i64> {
 }
 
 fn ceil_ratio(numerator: i128, denominator: i128) -> i64 {
-    let (n, d) = if denominator < 0 {
-        (-numerator, -denominator)
-    } else {
-        (numerator, denominator)
-    };
+    let (n, d) = if denominator < 0 { (-numerator, -denominator) } else { (numerator, denominator) };
     (-(-n).div_euclid(d)) as i64
 }

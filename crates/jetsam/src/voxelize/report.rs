@@ -64,11 +64,7 @@ pub(super) fn write(
         && of_mesh.volume.abs() > 0.0;
     let mass = if simple {
         let sign = of_mesh.volume.signum();
-        let upright = MassProperties {
-            volume: of_mesh.volume.abs(),
-            inertia: of_mesh.inertia * sign,
-            ..of_mesh
-        };
+        let upright = MassProperties { volume: of_mesh.volume.abs(), inertia: of_mesh.inertia * sign, ..of_mesh };
         moved(upright, placed.frame * placed.to_lattice)
     } else {
         moved(of_particles(solid), placed.frame)
@@ -79,63 +75,24 @@ pub(super) fn write(
             warnings.push(text);
         }
     };
-    warn(
-        !simple,
-        "mass, centre of mass and inertia are taken from the particles".into(),
-    );
-    warn(
-        solid.boundary_edges > 0,
-        format!(
-            "the mesh is open: {} edges have one triangle only",
-            solid.boundary_edges
-        ),
-    );
-    warn(
-        solid.flipped_triangles > 0,
-        format!(
-            "{} triangles were turned the wrong way",
-            solid.flipped_triangles
-        ),
-    );
-    warn(
-        solid.flipped_shells > 0,
-        format!("{} shells were inside out", solid.flipped_shells),
-    );
-    warn(
-        solid.overlap > 1,
-        format!(
-            "parts overlap, up to {} times; the overlap counts once",
-            solid.overlap
-        ),
-    );
+    warn(!simple, "mass, centre of mass and inertia are taken from the particles".into());
+    warn(solid.boundary_edges > 0, format!("the mesh is open: {} edges have one triangle only", solid.boundary_edges));
+    warn(solid.flipped_triangles > 0, format!("{} triangles were turned the wrong way", solid.flipped_triangles));
+    warn(solid.flipped_shells > 0, format!("{} shells were inside out", solid.flipped_shells));
+    warn(solid.overlap > 1, format!("parts overlap, up to {} times; the overlap counts once", solid.overlap));
     warn(
         solid.mended_rows > 0,
-        format!(
-            "{} rows passed through a hole and were decided by winding number",
-            solid.mended_rows
-        ),
+        format!("{} rows passed through a hole and were decided by winding number", solid.mended_rows),
     );
-    warn(
-        solid.count == 0,
-        "no cell is solid: use a smaller spacing, or `thin`".into(),
-    );
+    warn(solid.count == 0, "no cell is solid: use a smaller spacing, or `thin`".into());
     let ratio = volume_particles / of_mesh.volume.abs();
     warn(
         solid.watertight && options.shell.is_none() && !(0.75..=1.25).contains(&ratio),
-        format!(
-            "the particles' volume is {:.0} % of the mesh's: use a smaller spacing, or `thin`",
-            100.0 * ratio
-        ),
+        format!("the particles' volume is {:.0} % of the mesh's: use a smaller spacing, or `thin`", 100.0 * ratio),
     );
     if let Resolution::Particles(wanted) = options.resolution {
         let off = solid.count as f64 / wanted as f64 - 1.0;
-        warn(
-            off.abs() > 0.02,
-            format!(
-                "no lattice with {wanted} particles was found; this one has {}",
-                solid.count
-            ),
-        );
+        warn(off.abs() > 0.02, format!("no lattice with {wanted} particles was found; this one has {}", solid.count));
     }
     VoxelReport {
         particles: solid.count,
@@ -174,10 +131,7 @@ fn of_particles(solid: &Solid) -> MassProperties {
         let (mut n, mut s, mut q) = zero();
         for j in 0..ny {
             let row = solid.bits.row(j, k);
-            let bits = row
-                .iter()
-                .zip(0u32..)
-                .flat_map(|(w, at)| super::bits::ones(*w).map(move |b| at * 64 + b));
+            let bits = row.iter().zip(0u32..).flat_map(|(w, at)| super::bits::ones(*w).map(move |b| at * 64 + b));
             let (mut m, mut x, mut xx) = (0u64, 0u64, 0u64);
             for i in bits.map(u64::from) {
                 m += 1;
@@ -189,10 +143,7 @@ fn of_particles(solid: &Solid) -> MassProperties {
             for (sum, term) in s.iter_mut().zip([x, m * j, m * k]) {
                 *sum += u128::from(term);
             }
-            for (sum, term) in q
-                .iter_mut()
-                .zip([xx, m * j * j, m * k * k, x * j, x * k, m * j * k])
-            {
+            for (sum, term) in q.iter_mut().zip([xx, m * j * j, m * k * k, x * j, x * k, m * j * k]) {
                 *sum += u128::from(term);
             }
         }
@@ -206,28 +157,15 @@ fn of_particles(solid: &Solid) -> MassProperties {
     };
     let (n, s, q) = (0..nz).into_par_iter().map(slice).reduce(zero, add);
     if n == 0 {
-        return MassProperties {
-            volume: 0.0,
-            com: solid.lattice.origin,
-            inertia: DMat3::ZERO,
-        };
+        return MassProperties { volume: 0.0, com: solid.lattice.origin, inertia: DMat3::ZERO };
     }
     let h = solid.lattice.spacing;
     let count = n as f64;
     let mean = DVec3::from_array(s.map(|v| v as f64)) / count;
     let [xx, yy, zz, xy, xz, yz] = q.map(|v| v as f64 / count);
-    let second = DMat3::from_cols(
-        DVec3::new(xx, xy, xz),
-        DVec3::new(xy, yy, yz),
-        DVec3::new(xz, yz, zz),
-    );
+    let second = DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz));
     // A cube of side h has second moments h²/12 of its own.
     let central = second - outer(mean, mean) + DMat3::from_diagonal(DVec3::splat(1.0 / 12.0));
     let volume = count * h.powi(3);
-    MassProperties::from_moments(
-        solid.lattice.origin + mean * h,
-        volume,
-        DVec3::ZERO,
-        central * (volume * h * h),
-    )
+    MassProperties::from_moments(solid.lattice.origin + mean * h, volume, DVec3::ZERO, central * (volume * h * h))
 }

@@ -69,8 +69,8 @@ impl Rim {
             loops(&sides).iter().for_each(|path| cap(&mut caps, path));
         }
         let corners = |t: u32| caps.corners(t).map(in_cells);
-        let tree = (sides.len() > SHORT)
-            .then(|| WindingTree::of((0..caps.triangles.len() as u32).map(corners).collect()));
+        let tree =
+            (sides.len() > SHORT).then(|| WindingTree::of((0..caps.triangles.len() as u32).map(corners).collect()));
         Rim { sides, tree, caps }
     }
 
@@ -104,11 +104,7 @@ impl Rim {
             }
         };
         let margin = 0.5 - (value - value.round()).abs() - error;
-        let ahead = if margin > 0.0 {
-            bound.reach(margin, power).min(1e6) as u32
-        } else {
-            0
-        };
+        let ahead = if margin > 0.0 { bound.reach(margin, power).min(1e6) as u32 } else { 0 };
         Offset { value, ahead }
     }
 
@@ -204,8 +200,7 @@ fn cap(caps: &mut Shape, path: &[Fixed]) {
         return;
     }
     caps.vertices.push([0, 1, 2].map(|axis| mean(axis) as i64));
-    caps.triangles
-        .extend((0..n).map(|i| [first + (i + 1) % n, first + i, first + n]));
+    caps.triangles.extend((0..n).map(|i| [first + (i + 1) % n, first + i, first + n]));
 }
 
 #[cfg(test)]
@@ -219,13 +214,9 @@ mod tests {
     fn rim_and_crossings_make_the_winding_number() {
         // Three faces of a box with corners on cell centres, one with its sides on rows of cells.
         let (o, x, y, z) = ([2, 2, 2], [6, 2, 2], [2, 6, 2], [2, 2, 6]);
-        let triangles =
-            [[o, y, x], [o, x, z], [o, z, y]].map(|t| t.map(|p: [i64; 3]| p.map(|c| c * ONE)));
-        let sides = [[y, x], [x, z], [z, y]].map(|[a, b]| Side {
-            a: a.map(|c| c * ONE),
-            b: b.map(|c| c * ONE),
-            weight: 1,
-        });
+        let triangles = [[o, y, x], [o, x, z], [o, z, y]].map(|t| t.map(|p: [i64; 3]| p.map(|c| c * ONE)));
+        let sides =
+            [[y, x], [x, z], [z, y]].map(|[a, b]| Side { a: a.map(|c| c * ONE), b: b.map(|c| c * ONE), weight: 1 });
         let rim = Rim::new(sides.to_vec());
         for cell in (0..729u32).map(|n| [n % 9, n / 9 % 9, n / 81]) {
             // A hair off the cell, as the half-open rule has it.
@@ -239,18 +230,14 @@ mod tests {
             for t in triangles {
                 if super::super::raster::slices(t, 9).contains(&cell[2]) {
                     crossings(t, cell[2], 9, |j, i, up| {
-                        passed += i32::from(j == cell[1] && i <= i64::from(cell[0]))
-                            * if up { 1 } else { -1 };
+                        passed += i32::from(j == cell[1] && i <= i64::from(cell[0])) * if up { 1 } else { -1 };
                     });
                 }
             }
             let found = f64::from(passed) + rim.offset(cell, 0).value;
             // On a face, edge or corner itself the number jumps: there only nearness to some side of the jump is asked.
             let on = cell.contains(&2) && cell.iter().sum::<u32>() <= 10;
-            assert!(
-                (found - expected).abs() < 1e-4 || on,
-                "{cell:?}: {found} instead of {expected}"
-            );
+            assert!((found - expected).abs() < 1e-4 || on, "{cell:?}: {found} instead of {expected}");
         }
     }
 }

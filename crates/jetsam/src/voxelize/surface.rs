@@ -29,32 +29,19 @@ const NEAREST: f64 = 0.592;
 pub fn sample_surface(mesh: &Mesh, spacing: f64, seed: u64) -> Result<Vec<DVec3>, VoxelizeError> {
     mesh.check().map_err(VoxelizeError::Mesh)?;
     if !(spacing.is_finite() && spacing > 0.0) {
-        return Err(VoxelizeError::Option {
-            option: "spacing",
-            value: spacing.to_string(),
-        });
+        return Err(VoxelizeError::Option { option: "spacing", value: spacing.to_string() });
     }
     let area = mesh.area();
     let wanted = area / (spacing * spacing);
     if wanted.is_nan() || wanted >= MOST as f64 {
         let fits = (area / MOST as f64).sqrt() * 1.01;
-        return Err(VoxelizeError::TooManyPoints {
-            spacing,
-            points: wanted,
-            limit: MOST,
-            fits,
-        });
+        return Err(VoxelizeError::TooManyPoints { spacing, points: wanted, limit: MOST, fits });
     }
     if area <= 0.0 {
         return Err(VoxelizeError::Point);
     }
     let wanted = (wanted.round() as usize).max(1);
-    let trials = throw(
-        mesh,
-        wanted,
-        area,
-        &mut Random(seed ^ 0x5851_f42d_4c95_7f2d),
-    );
+    let trials = throw(mesh, wanted, area, &mut Random(seed ^ 0x5851_f42d_4c95_7f2d));
     Ok(eliminate(trials, wanted, area))
 }
 
@@ -68,11 +55,7 @@ fn throw(mesh: &Mesh, wanted: usize, area: f64, random: &mut Random) -> Vec<DVec
         covered += 0.5 * (b - a).cross(c - a).length();
         while (points.len() as f64 + 0.5) * area <= covered * total {
             let (u, v) = (random.unit(), random.unit());
-            let (u, v) = if u + v > 1.0 {
-                (1.0 - u, 1.0 - v)
-            } else {
-                (u, v)
-            };
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
             points.push(a + (b - a) * u + (c - a) * v);
         }
     }
@@ -87,9 +70,7 @@ struct Crowded {
 
 impl Ord for Crowded {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.weight
-            .total_cmp(&other.weight)
-            .then(self.point.cmp(&other.point))
+        self.weight.total_cmp(&other.weight).then(self.point.cmp(&other.point))
     }
 }
 impl PartialOrd for Crowded {
@@ -116,11 +97,7 @@ fn eliminate(points: Vec<DVec3>, wanted: usize, area: f64) -> Vec<DVec3> {
     let cells = &filling;
     let crowding = |i: u32, j: u32| {
         let d = points[i as usize].distance(points[j as usize]) / reach;
-        if d < 1.0 && i != j {
-            (1.0 - d.max(NEAREST)).powi(8)
-        } else {
-            0.0
-        }
+        if d < 1.0 && i != j { (1.0 - d.max(NEAREST)).powi(8) } else { 0.0 }
     };
     let neighbours = |i: u32| {
         let home = cell(points[i as usize]);
@@ -128,17 +105,9 @@ fn eliminate(points: Vec<DVec3>, wanted: usize, area: f64) -> Vec<DVec3> {
         let near = offsets.filter_map(move |o| cells.get(&home.saturating_add(o)));
         near.flatten().copied()
     };
-    let mut weight: Vec<f64> = (0..points.len() as u32)
-        .map(|i| neighbours(i).map(|j| crowding(i, j)).sum())
-        .collect();
-    let mut queue: BinaryHeap<Crowded> = weight
-        .iter()
-        .zip(0..)
-        .map(|(weight, point)| Crowded {
-            weight: *weight,
-            point,
-        })
-        .collect();
+    let mut weight: Vec<f64> = (0..points.len() as u32).map(|i| neighbours(i).map(|j| crowding(i, j)).sum()).collect();
+    let mut queue: BinaryHeap<Crowded> =
+        weight.iter().zip(0..).map(|(weight, point)| Crowded { weight: *weight, point }).collect();
     let mut gone = vec![false; points.len()];
     let mut left = points.len();
     while left > wanted {
@@ -146,10 +115,7 @@ fn eliminate(points: Vec<DVec3>, wanted: usize, area: f64) -> Vec<DVec3> {
         let i = top.point;
         if top.weight > weight[i as usize] {
             // Neighbours have gone since: it is less crowded than it was.
-            queue.push(Crowded {
-                weight: weight[i as usize],
-                point: i,
-            });
+            queue.push(Crowded { weight: weight[i as usize], point: i });
             continue;
         }
         gone[i as usize] = true;
@@ -158,12 +124,7 @@ fn eliminate(points: Vec<DVec3>, wanted: usize, area: f64) -> Vec<DVec3> {
             weight[j as usize] -= crowding(i, j);
         }
     }
-    points
-        .iter()
-        .zip(gone)
-        .filter(|(_, gone)| !gone)
-        .map(|(p, _)| *p)
-        .collect()
+    points.iter().zip(gone).filter(|(_, gone)| !gone).map(|(p, _)| *p).collect()
 }
 
 /// A small generator of even quality (SplitMix64; Steele, Lea & Flood 2014).

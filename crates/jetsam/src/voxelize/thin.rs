@@ -16,9 +16,7 @@ use super::rim::in_cells;
 /// rings of touched cells join them.
 pub(super) fn rescue(shape: &Shape, solid: &mut BitGrid) {
     let touched = touched(shape, solid.dims());
-    let ring: Vec<_> = (-1..=1)
-        .flat_map(|k| (-1..=1).map(move |j| (j, k, 1)))
-        .collect();
+    let ring: Vec<_> = (-1..=1).flat_map(|k| (-1..=1).map(move |j| (j, k, 1))).collect();
     let mut added = thick(solid).dilated(&ring, false);
     added.combine(&touched, |near, touched| touched & !near);
     for _ in 0..2 {
@@ -62,8 +60,7 @@ fn thick(solid: &BitGrid) -> BitGrid {
     let block = |w: usize, j: u32, k: u32| {
         let square = |w: usize| {
             let rows = [(j, k), (j + 1, k), (j, k + 1), (j + 1, k + 1)];
-            rows.iter()
-                .fold(!0, |all, &(j, k)| all & solid.row(j, k)[w])
+            rows.iter().fold(!0, |all, &(j, k)| all & solid.row(j, k)[w])
         };
         let here = square(w);
         let next = if w + 1 < per_row { square(w + 1) } else { 0 };
@@ -73,9 +70,7 @@ fn thick(solid: &BitGrid) -> BitGrid {
         for (j, row) in slice.chunks_mut(per_row).enumerate() {
             for (w, word) in row.iter_mut().enumerate() {
                 for (dj, dk) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                    let (Some(j), Some(k)) =
-                        ((j as u32).checked_sub(dj), (k as u32).checked_sub(dk))
-                    else {
+                    let (Some(j), Some(k)) = ((j as u32).checked_sub(dj), (k as u32).checked_sub(dk)) else {
                         continue;
                     };
                     if j + 1 < ny && k + 1 < nz {
@@ -95,28 +90,25 @@ fn touched(shape: &Shape, dims: [u32; 3]) -> BitGrid {
     let grid = BitGrid::new(dims);
     let words: Vec<AtomicU64> = grid.words().iter().map(|_| AtomicU64::new(0)).collect();
     let (per_row, per_slice) = (grid.row_words(), grid.slice_words());
-    (0..shape.triangles.len() as u32)
-        .into_par_iter()
-        .for_each(|t| {
-            let t = shape.corners(t).map(in_cells);
-            let (lo, hi) = (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2]));
-            let range = |axis: usize| {
-                let last = i64::from(dims[axis]) - 1;
-                let first = ((lo[axis] - 0.5).ceil() as i64).clamp(0, last);
-                first..=((hi[axis] + 0.5).floor() as i64).clamp(0, last)
-            };
-            for k in range(2) {
-                for j in range(1) {
-                    for i in range(0) {
-                        if touches(t.map(|v| v - DVec3::new(i as f64, j as f64, k as f64))) {
-                            let word =
-                                k as usize * per_slice + j as usize * per_row + i as usize / 64;
-                            words[word].fetch_or(1 << (i % 64), Ordering::Relaxed);
-                        }
+    (0..shape.triangles.len() as u32).into_par_iter().for_each(|t| {
+        let t = shape.corners(t).map(in_cells);
+        let (lo, hi) = (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2]));
+        let range = |axis: usize| {
+            let last = i64::from(dims[axis]) - 1;
+            let first = ((lo[axis] - 0.5).ceil() as i64).clamp(0, last);
+            first..=((hi[axis] + 0.5).floor() as i64).clamp(0, last)
+        };
+        for k in range(2) {
+            for j in range(1) {
+                for i in range(0) {
+                    if touches(t.map(|v| v - DVec3::new(i as f64, j as f64, k as f64))) {
+                        let word = k as usize * per_slice + j as usize * per_row + i as usize / 64;
+                        words[word].fetch_or(1 << (i % 64), Ordering::Relaxed);
                     }
                 }
             }
-        });
+        }
+    });
     let mut grid = grid;
     grid.set_words(words.into_iter().map(AtomicU64::into_inner));
     grid
@@ -133,11 +125,6 @@ fn touches(t: [DVec3; 3]) -> bool {
         let radius = half * axis.abs().element_sum() + 1e-12;
         a.min(b).min(c) > radius || a.max(b).max(c) < -radius
     };
-    let crossed = edges
-        .iter()
-        .flat_map(|e| [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis.cross(*e)));
-    !([DVec3::X, DVec3::Y, DVec3::Z, normal]
-        .into_iter()
-        .chain(crossed)
-        .any(apart))
+    let crossed = edges.iter().flat_map(|e| [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis.cross(*e)));
+    !([DVec3::X, DVec3::Y, DVec3::Z, normal].into_iter().chain(crossed).any(apart))
 }

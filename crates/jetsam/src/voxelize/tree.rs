@@ -22,11 +22,7 @@ pub fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
 fn half_tangent(a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let scale = la * lb * lc;
-    [
-        a.dot(b.cross(c)),
-        scale + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb,
-        scale,
-    ]
+    [a.dot(b.cross(c)), scale + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb, scale]
 }
 
 /// The generalised winding number of the mesh at `p`, triangle by triangle.
@@ -90,10 +86,7 @@ pub(crate) struct Bound {
 }
 
 impl Bound {
-    pub const NONE: Bound = Bound {
-        rate: 0.0,
-        distance: f64::INFINITY,
-    };
+    pub const NONE: Bound = Bound { rate: 0.0, distance: f64::INFINITY };
 
     /// Adds a source whose field is `rate` here.
     pub fn add(&mut self, rate: f64, distance: f64) {
@@ -175,11 +168,7 @@ impl WindingTree {
             at = pending[depth] as usize;
         }
         let winding = angle / (4.0 * PI);
-        Sample {
-            winding,
-            sheet,
-            touching,
-        }
+        Sample { winding, sheet, touching }
     }
 }
 
@@ -193,12 +182,7 @@ pub(crate) fn segment_distance(a: DVec3, b: DVec3) -> f64 {
 fn build(items: &mut [[DVec3; 3]], first: u32, nodes: &mut Vec<Node>) {
     let (mut area, mut weighted, mut normal) = (0.0, DVec3::ZERO, DVec3::ZERO);
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let parts = |t: &[DVec3; 3]| {
-        (
-            0.5 * (t[1] - t[0]).cross(t[2] - t[0]),
-            (t[0] + t[1] + t[2]) / 3.0,
-        )
-    };
+    let parts = |t: &[DVec3; 3]| (0.5 * (t[1] - t[0]).cross(t[2] - t[0]), (t[0] + t[1] + t[2]) / 3.0);
     for t in items.iter() {
         let (n, centroid) = parts(t);
         area += n.length();
@@ -206,11 +190,7 @@ fn build(items: &mut [[DVec3; 3]], first: u32, nodes: &mut Vec<Node>) {
         normal += n;
         (lo, hi) = (lo.min(centroid), hi.max(centroid));
     }
-    let center = if area > 0.0 {
-        weighted / area
-    } else {
-        0.5 * (lo + hi)
-    };
+    let center = if area > 0.0 { weighted / area } else { 0.5 * (lo + hi) };
     let (mut radius, mut moment, mut second) = (0.0f64, DMat3::ZERO, [DMat3::ZERO; 3]);
     for t in items.iter() {
         let (n, centroid) = parts(t);
@@ -222,17 +202,7 @@ fn build(items: &mut [[DVec3; 3]], first: u32, nodes: &mut Vec<Node>) {
         (0..3).for_each(|i| second[i] += square * n[i]);
     }
     let at = nodes.len();
-    nodes.push(Node {
-        center,
-        radius,
-        normal,
-        moment,
-        area,
-        first,
-        count: items.len() as u32,
-        second,
-        other: 0,
-    });
+    nodes.push(Node { center, radius, normal, moment, area, first, count: items.len() as u32, second, other: 0 });
     if items.len() > LEAF {
         let axis = (hi - lo).max_position();
         let middle = items.len() / 2;
