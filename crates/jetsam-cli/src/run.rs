@@ -4,7 +4,7 @@ use crate::args::Run;
 use crate::output::Outputs;
 use crate::terminal::{progress, say, seconds, table};
 use crate::{Outcome, terminal};
-use jetsam::{Recorder, Scene, Summary, World};
+use jetsam::{Recorder, Scene, Summary, Trouble, World};
 use std::ffi::OsStr;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -24,15 +24,19 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     let times = Frames::of(&scene, args);
     let bar = progress(times.count, &name_of(&input.scene).to_string_lossy());
     let mut recorder = Recorder::default();
+    let mut trouble = None;
     outputs.write(&world, &recorder.frame(&world, Duration::ZERO))?;
     for frame in 1..=times.count {
         let start = Instant::now();
-        world.advance(times.at(frame), |_, step| step.finite);
+        world.advance(times.at(frame), |_, step| {
+            trouble = step.trouble;
+            trouble.is_none()
+        });
         let stats = recorder.frame(&world, start.elapsed());
         outputs.write(&world, &stats)?;
         bar.set_message(format!("real-time factor {:.3}", stats.real_time_factor));
         bar.inc(1);
-        if stats.nonfinite > 0 {
+        if trouble.is_some() {
             break;
         }
     }
@@ -40,7 +44,7 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     outputs.finish()?;
     let summary = recorder.summary(&world);
     say(&describe(&summary, &folder));
-    Ok(judge(&scene, &summary))
+    Ok(judge(&scene, &summary, trouble))
 }
 
 /// Sets how many threads compute; before anything is computed.
@@ -104,15 +108,14 @@ fn describe(s: &Summary, folder: &Path) -> String {
 }
 
 /// Whether the run can be believed.
-fn judge(scene: &Scene, summary: &Summary) -> Outcome {
+fn judge(scene: &Scene, summary: &Summary, trouble: Option<Trouble>) -> Outcome {
     let mut outcome = Outcome::Fine;
     let mut blame = |message: String, help: &str| {
         terminal::say(&format!("error: {message}\nhelp: {help}"));
         outcome = Outcome::WentWrong;
     };
-    if summary.nonfinite > 0 {
-        let message =
-            format!("{} values were not finite at {:.4} s; the run was stopped", summary.nonfinite, summary.time);
+    if let Some(trouble) = trouble {
+        let message = format!("the run was stopped at {:.4} s: {trouble}", summary.time);
         blame(message, "`jetsam check` shows the stability margins; remove a stated dt, stiffness or sound_speed");
     }
     if summary.lost as f64 > scene.run.lost_allowed {

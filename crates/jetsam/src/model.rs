@@ -202,6 +202,9 @@ impl Model {
     /// Largest time step allowed now and what bounds it (E29), from the largest speed (m/s) and acceleration (m/s^2).
     pub fn largest_dt(&self, speed: f64, acceleration: f64) -> (f64, DtBound) {
         let s = &self.solver;
+        if let Some(dt) = s.dt {
+            return (dt, DtBound::Scene);
+        }
         let mut best = (f64::INFINITY, DtBound::Frame);
         if !self.fluids.is_empty() {
             let sound = s.courant * self.support / (2.0 * (self.sound_speed + speed));

@@ -33,9 +33,23 @@ pub struct StepReport {
     pub dt: f64,
     /// What bounded it.
     pub bound: DtBound,
-    /// Whether every position is finite.
-    pub finite: bool,
+    /// What has gone wrong, if anything.
+    pub trouble: Option<Trouble>,
 }
+
+/// What can go wrong inside a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Trouble {
+    /// A position or velocity is not finite.
+    #[error("values are not finite; try a smaller solver.courant, or more solver.artificial_viscosity")]
+    NotFinite,
+    /// The step has become so short that time stands still.
+    #[error("the time step has collapsed; look for bodies that overlap, or raise solver.artificial_viscosity")]
+    Stalled,
+}
+
+/// A step shorter than this fraction of the step at rest means that time stands still.
+const STALLED: f64 = 1e-4;
 
 /// Momentum against the impulse from outside (E12, C9): what is missing is the residual.
 #[derive(Clone, Copy, Debug, Default)]
@@ -155,7 +169,15 @@ impl World {
         }
         self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force);
         self.momentum.force = ledger.external_force;
-        StepReport { dt, bound, finite: ledger.nonfinite == 0 }
+        let (at_rest, _) = self.model.largest_dt(0.0, 0.0);
+        let trouble = if ledger.nonfinite > 0 || !dt.is_finite() {
+            Some(Trouble::NotFinite)
+        } else if bound != DtBound::Frame && dt < STALLED * at_rest {
+            Some(Trouble::Stalled)
+        } else {
+            None
+        };
+        StepReport { dt, bound, trouble }
     }
 
     /// Constants.

@@ -243,7 +243,7 @@ impl<'a> Pairs<'a> {
             w_factor: model.factors.w,
             inverse: model.inverse_support(),
             softening: model.softening(),
-            mueller: (model.solver.viscosity == Viscosity::Mueller).then(|| model.factors.laplacian),
+            mueller: (model.solver.viscosity == Viscosity::Mueller).then_some(model.factors.laplacian),
             force: [[0.0; LANES]; 3],
             carry: [[0.0; LANES]; 3],
         }

@@ -19,7 +19,7 @@ pub mod kernel;
 macro_rules! law_file {
     ($(#[$doc:meta])* $name:ident, $path:literal) => {
         $(#[$doc])*
-        #[allow(missing_docs, dead_code, non_snake_case, unused_imports)]
+        #[allow(missing_docs, dead_code, non_snake_case, unused_imports, clippy::all)] // translated text
         pub mod $name {
             use super::Root as _;
             naga_rust_embed::include_wgsl_mr!(public_items = true, rule(inline(always)), $path);

@@ -155,7 +155,7 @@ pub struct Solver {
     /// Time integration (E20).
     #[serde(default)]
     pub integrator: Integrator,
-    /// Largest time step. When absent, from E29.
+    /// Time step, in place of what E29 derives; only the end of a frame may shorten it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dt: Option<f64>,
     /// `C_a` of E29: fraction of the time sound takes through half a support.

@@ -1,0 +1,228 @@
+//! Fluids filled and carved, and the constants derived from a scene: speeds, stiffness, contacts, time step.
+
+use super::bodies::NewBody;
+use super::near::Near;
+use crate::error::Result;
+use crate::interact::cells::Grid;
+use crate::model::{ContactModel, DtBound, Factors, FluidModel, Model};
+use crate::scene::{Coupling, EquationOfState, Scene, Start};
+use glam::DVec3;
+
+/// A fluid particle on its way into the state.
+pub(super) struct Drop {
+    /// Place (m).
+    pub(super) x: DVec3,
+    /// Velocity (m/s).
+    pub(super) v: DVec3,
+    /// Index of its fluid.
+    pub(super) fluid: u32,
+}
+
+impl Scene {
+    /// Constants, and the fluid: place, velocity, index of its fluid.
+    pub(super) fn derive(
+        &self,
+        grid: Grid,
+        volume: f64,
+        support: f64,
+        bodies: &[NewBody],
+        mut carver: Near,
+        warnings: &mut Vec<String>,
+    ) -> Result<(Model, Vec<Drop>)> {
+        let gravity = DVec3::from(self.world.gravity);
+        let spacing = self.resolution.spacing;
+        let mut fluid: Vec<Drop> = Vec::new();
+        let (mut carved, mut outside) = (0, 0);
+        for (index, f) in self.fluid.iter().enumerate() {
+            let key = format!("fluid.{index}.shape");
+            let solid = self.solid(&f.shape, &key)?;
+            warnings.extend(solid.warnings.iter().cloned());
+            let before = fluid.len();
+            for p in solid.points {
+                let within = (0..3)
+                    .all(|a| self.world.dimensions == 2 && a == 1 || (p[a] >= grid.min[a] && p[a] <= grid.max[a]));
+                if !within {
+                    outside += 1;
+                } else if carver.has(p, None) {
+                    carved += 1;
+                } else {
+                    let mut v = DVec3::from(f.velocity);
+                    if self.world.dimensions == 2 {
+                        v.y = 0.0;
+                    }
+                    fluid.push(Drop { x: p, v, fluid: index as u32 });
+                }
+            }
+            if fluid.len() == before {
+                let message = format!("`{key}` holds no particle inside the domain that no body or other fluid takes");
+                return Err(self.error(&key, message, "move or enlarge the shape, or choose a smaller spacing"));
+            }
+            for drop in &fluid[before..] {
+                carver.insert(drop.x);
+            }
+        }
+        if carved > 0 {
+            warnings.push(format!("{carved} fluid particles were carved away where bodies or other fluids stand"));
+        }
+        if outside > 0 {
+            warnings.push(format!("{outside} fluid particles outside the domain were left out"));
+        }
+
+        let largest_speed = self.largest_speed(&fluid, bodies, gravity, &grid);
+        let sound_speed = self.solver.sound_speed.unwrap_or(10.0 * largest_speed);
+        self.squeeze(&mut fluid, gravity, sound_speed);
+        let fluids: Vec<FluidModel> = self
+            .fluid
+            .iter()
+            .map(|f| FluidModel {
+                name: f.name.clone().unwrap_or_else(|| "fluid".into()),
+                density: f.density as f32,
+                mass: (f.density * volume) as f32,
+                viscosity: f.viscosity as f32,
+                stiffness: (sound_speed * sound_speed * f.density) as f32,
+                artificial: (self.solver.artificial_viscosity * f.density * sound_speed * 0.5 * support) as f32,
+            })
+            .collect();
+        let contacts = bodies
+            .iter()
+            .map(|b| ContactModel {
+                inverse_mass: (1.0 / b.mass) as f32,
+                ln_restitution: b.restitution.ln() as f32,
+                // a body of n particles rests on about n^(1/3) of them
+                shared_by: if b.mass.is_infinite() { 1.0 } else { (b.offset.len() as f64).cbrt() as f32 },
+                stiffness: b.stiffness.unwrap_or(0.0) as f32,
+                damping: b.damping.unwrap_or(-1.0) as f32,
+            })
+            .collect();
+        let mut model = Model {
+            dimensions: self.world.dimensions,
+            spacing,
+            support,
+            volume,
+            kernel: self.solver.kernel,
+            factors: Factors::new(self.solver.kernel, self.solver.support, support, self.world.dimensions),
+            fluids,
+            contacts,
+            largest_speed,
+            sound_speed,
+            gravity,
+            fields: self.force.clone(),
+            grid,
+            contact_diameter: self.solver.contact_diameter * spacing,
+            solver: self.solver.clone(),
+            dt_bounds: Vec::new(),
+            full_support: if self.world.dimensions == 3 {
+                4.0 / 3.0 * std::f64::consts::PI * self.solver.support.powi(3)
+            } else {
+                std::f64::consts::PI * self.solver.support.powi(2)
+            },
+            warnings: Vec::new(),
+        };
+        model.dt_bounds = self.dt_bounds(&model);
+        Ok((model, fluid))
+    }
+
+    /// Largest speed the scene can reach (m/s): from depth, drop height and velocities given.
+    fn largest_speed(&self, fluid: &[Drop], bodies: &[NewBody], gravity: DVec3, grid: &Grid) -> f64 {
+        let g = gravity.length();
+        let mut speed: f64 = 0.0;
+        if g > 0.0 {
+            let up = -gravity / g;
+            let height = |p: DVec3| p.dot(up);
+            let corner = |far: bool| {
+                DVec3::new(
+                    if (up.x > 0.0) == far { grid.max.x } else { grid.min.x },
+                    if (up.y > 0.0) == far { grid.max.y } else { grid.min.y },
+                    if (up.z > 0.0) == far { grid.max.z } else { grid.min.z },
+                )
+            };
+            let lowest_fluid = fluid.iter().map(|f| height(f.x)).fold(f64::INFINITY, f64::min);
+            let top = fluid.iter().map(|f| height(f.x)).fold(f64::NEG_INFINITY, f64::max);
+            let floor = if bodies.iter().any(|b| b.mass.is_infinite()) { height(corner(false)) } else { lowest_fluid };
+            if top.is_finite() {
+                speed = (2.0 * g * (top - floor).max(0.0)).sqrt();
+            }
+            // bodies fall onto the fluid, or onto the floor where there is none
+            let ground = if top.is_finite() { top } else { height(corner(false)) };
+            for body in bodies.iter().filter(|b| b.mass.is_finite()) {
+                let drop = (height(body.x) - ground).max(0.0);
+                speed = speed.max((2.0 * g * drop + body.v.length_squared()).sqrt());
+            }
+        }
+        for f in &self.fluid {
+            speed = speed.max(DVec3::from(f.velocity).length());
+        }
+        for body in bodies {
+            let reach = body.offset.iter().map(|o| o.length()).fold(0.0, f64::max);
+            speed = speed.max(body.v.length() + body.spin.length() * reach * f64::from(body.mass.is_finite() as u8));
+        }
+        // a scene in which nothing moves still needs a scale: a spacing in a tenth of a second
+        if speed > 0.0 { speed } else { 10.0 * self.resolution.spacing }
+    }
+
+    /// Squeezes fluids that start hydrostatic: the equation of state then holds up what stands above.
+    fn squeeze(&self, fluid: &mut [Drop], gravity: DVec3, sound_speed: f64) {
+        let g = gravity.length();
+        if g == 0.0 {
+            return;
+        }
+        let up = -gravity / g;
+        for (index, f) in self.fluid.iter().enumerate() {
+            if f.start != Start::Hydrostatic {
+                continue;
+            }
+            let own = || fluid.iter().filter(|p| p.fluid == index as u32).map(|p| p.x.dot(up));
+            let half = 0.5 * self.resolution.spacing;
+            let (bottom, top) =
+                (own().fold(f64::INFINITY, f64::min) - half, own().fold(f64::NEG_INFINITY, f64::max) + half);
+            let depth = top - bottom;
+            let c_sq = sound_speed * sound_speed;
+            // height y above the bottom at rest -> height under its own weight: integral of rho_0 / rho
+            let squeezed = |y: f64| match self.solver.equation_of_state {
+                // rho / rho_0 = 1 + g (depth - y) / c^2, to first order
+                EquationOfState::Linear => y - g * (depth * y - 0.5 * y * y) / c_sq,
+                // rho / rho_0 = (1 + 7 g (depth - y) / c^2)^(1/7) in present heights, to first order the same
+                EquationOfState::Tait => {
+                    let a = 7.0 * g / c_sq;
+                    let power = |u: f64| (1.0 + a * u).powf(6.0 / 7.0);
+                    (power(depth) - power(depth - y)) / (a * 6.0 / 7.0)
+                }
+            };
+            for p in fluid.iter_mut().filter(|p| p.fluid == index as u32) {
+                let y = p.x.dot(up) - bottom;
+                p.x += (squeezed(y) - y) * up;
+            }
+        }
+    }
+
+    /// Bounds of the time step that do not change (E29).
+    fn dt_bounds(&self, model: &Model) -> Vec<(DtBound, f64)> {
+        let s = &self.solver;
+        let mut bounds = Vec::new();
+        let mut viscous = f64::INFINITY;
+        for f in &self.fluid {
+            if f.viscosity > 0.0 {
+                viscous = viscous.min(s.courant_viscous * model.support.powi(2) * f.density / (4.0 * f.viscosity));
+            }
+        }
+        let mut contact = f64::INFINITY;
+        for a in 0..model.contacts.len() {
+            contact = contact.min(model.contact_time(a) / 20.0);
+        }
+        if s.coupling == Coupling::Spring && !self.rigid.is_empty() {
+            for (index, _) in self.fluid.iter().enumerate() {
+                for b in (0..model.contacts.len()).filter(|&b| model.contacts[b].inverse_mass > 0.0) {
+                    let (k, _) = model.coupling_pair(index as u32, b as u32);
+                    let mass = 1.0 / f64::from(1.0 / model.fluids[index].mass + model.contacts[b].inverse_mass);
+                    contact = contact.min(std::f64::consts::PI * (mass / f64::from(k)).sqrt() / 20.0);
+                }
+            }
+        }
+        for (bound, dt) in [(DtBound::Viscosity, viscous), (DtBound::Contact, contact)] {
+            if dt.is_finite() {
+                bounds.push((bound, dt));
+            }
+        }
+        bounds
+    }
+}

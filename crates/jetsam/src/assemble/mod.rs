@@ -1,0 +1,230 @@
+//! From a scene to constants and a state: shapes are filled, bodies placed, walls built, numbers derived.
+//!
+//! Everything that can be wrong with a scene as a whole is found here: bodies outside the domain, periodic axes
+//! too short, more memory than there is. What is repaired (fluid carved where bodies stand) is said in the
+//! model's warnings.
+
+mod bodies;
+mod fluid;
+mod memory;
+mod near;
+
+use crate::error::Result;
+use crate::interact::cells::Grid;
+use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::scene::{Scene, Shape, Wall};
+use crate::state::{Bodies, Body, Kind, Particles, Record, State};
+use bodies::NewBody;
+use fluid::Drop;
+use glam::{DMat3, DVec3};
+use memory::{BYTES_PER_CELL, BYTES_PER_PARTICLE, available_gigabytes, check_available};
+use near::Near;
+use std::sync::Arc;
+
+/// Fluid closer to a body's particle than this many spacings is carved away.
+const CARVE: f64 = 0.85;
+
+/// A scene made ready to run.
+#[derive(Debug)]
+pub struct Assembly {
+    /// Constants.
+    pub model: Model,
+    /// State at the beginning.
+    pub state: State,
+    /// Mesh of each body that was given as one, in the body's frame about the centre of mass; shared by copies.
+    pub meshes: Vec<Option<(Arc<Mesh>, DVec3)>>,
+}
+
+impl Scene {
+    /// Makes the scene ready to run.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the scene, with place and remedy.
+    pub fn assemble(&self) -> Result<Assembly> {
+        self.check_whole()?;
+        let mut warnings = Vec::new();
+        let spacing = self.resolution.spacing;
+        let dimensions = self.world.dimensions;
+        let support = self.solver.support * spacing;
+        let volume = spacing.powi(dimensions as i32);
+        let layers = (self.solver.support - 1e-9).ceil().max(1.0);
+        let grid = self.grid(support, layers * spacing);
+        self.check_memory(&grid)?;
+
+        let mut bodies = self.rigid_bodies(&grid, volume, &mut warnings)?;
+        let rigid_count = bodies.len();
+        bodies.extend(self.static_bodies(&grid, volume, layers as usize, &mut warnings)?);
+        let mut carver = Near::new(CARVE * spacing);
+        for body in &bodies {
+            for p in body.points() {
+                carver.insert(p);
+            }
+        }
+        warn_of_overlap(&bodies[..], spacing, &mut warnings);
+        let (mut model, fluid) = self.derive(grid, volume, support, &bodies, carver, &mut warnings)?;
+        model.warnings = warnings;
+        let meshes = bodies.iter().map(|b| b.mesh.clone()).collect();
+        let state = join(fluid, bodies, rigid_count, &model);
+        let particles = state.particles.len() as f64;
+        check_available(particles * BYTES_PER_PARTICLE).map_err(|(need, have)| {
+            let message = format!("{particles} particles need {need:.1} GB of memory, and {have:.1} GB are available");
+            self.error("resolution.spacing", message, "choose a larger [resolution] spacing")
+        })?;
+        Ok(Assembly { model, state, meshes })
+    }
+
+    fn check_whole(&self) -> Result<()> {
+        if !(2..=3).contains(&self.world.dimensions) {
+            let message = format!("`world.dimensions` = {} is neither 2 nor 3", self.world.dimensions);
+            return Err(self.error("world.dimensions", message, "give 2 (the x-z plane) or 3"));
+        }
+        for a in (0..3).filter(|&a| !(self.world.dimensions == 2 && a == 1)) {
+            if self.domain.max[a] <= self.domain.min[a] {
+                let message = format!("the domain is empty along {}", ["x", "y", "z"][a]);
+                return Err(self.error("domain.max", message, "make every component of max larger than min's"));
+            }
+        }
+        if self.world.dimensions == 2 && (self.world.gravity[1] != 0.0) {
+            let message = "a 2D scene lies in the x-z plane, but gravity has a y component";
+            return Err(self.error("world.gravity", message, "give gravity = [x, 0, z]"));
+        }
+        if self.fluid.is_empty() && self.rigid.is_empty() {
+            return Err(self.error(
+                "",
+                "the scene has neither fluid nor rigid bodies",
+                "add a [[fluid]] or a [[rigid]]",
+            ));
+        }
+        let support = self.solver.support * self.resolution.spacing;
+        for a in 0..3 {
+            let length = self.domain.max[a] - self.domain.min[a];
+            let flat = self.world.dimensions == 2 && a == 1;
+            if self.domain.walls[a] == Wall::Periodic && !flat && length < 3.0 * support {
+                let message =
+                    format!("a periodic axis of {length} m is shorter than three supports ({:.4} m)", 3.0 * support);
+                return Err(self.error("domain.walls", message, "lengthen the domain or choose a smaller spacing"));
+            }
+        }
+        Ok(())
+    }
+
+    fn grid(&self, support: f64, wall: f64) -> Grid {
+        let (min, max) = (DVec3::from(self.domain.min), DVec3::from(self.domain.max));
+        Grid::new(min, max, self.domain.walls, self.world.dimensions, support, wall)
+    }
+
+    fn check_memory(&self, grid: &Grid) -> Result<()> {
+        let cells: f64 = grid.cells.iter().map(|&c| f64::from(c)).product();
+        let flat = self.world.dimensions == 2;
+        let reach = |shape: &Shape| match shape {
+            Shape::Box(r) => {
+                let s = DVec3::from(r.max) - DVec3::from(r.min);
+                s.x * s.z * if flat { 1.0 } else { s.y }
+            }
+            _ => 0.0,
+        };
+        let cell = self.resolution.spacing.powi(self.world.dimensions as i32);
+        let particles: f64 = self.fluid.iter().map(|f| reach(&f.shape).max(0.0)).sum::<f64>() / cell;
+        let need = cells * BYTES_PER_CELL + particles * BYTES_PER_PARTICLE;
+        let too_many = cells >= f64::from(i32::MAX) || particles >= f64::from(i32::MAX);
+        if too_many || check_available(need).is_err() {
+            let have = available_gigabytes();
+            let message = format!(
+                "a spacing of {} m needs {cells:.2e} cells and {particles:.2e} fluid particles, {:.1} GB of memory; {have:.1} GB are available",
+                self.resolution.spacing,
+                need / 1e9
+            );
+            return Err(self.error("resolution.spacing", message, "choose a larger spacing or a smaller domain"));
+        }
+        Ok(())
+    }
+}
+
+fn warn_of_overlap(bodies: &[NewBody], spacing: f64, warnings: &mut Vec<String>) {
+    let mut near = Near::new(0.5 * spacing);
+    for (index, body) in bodies.iter().enumerate() {
+        if body.mass.is_infinite() {
+            continue;
+        }
+        for p in body.points() {
+            near.insert_tagged(p, index as u32);
+        }
+    }
+    for (index, body) in bodies.iter().enumerate() {
+        let deep = body.points().filter(|&p| near.has(p, Some(index as u32))).count();
+        if deep > 0 {
+            warnings.push(format!(
+                "body `{}` overlaps another by {deep} particles: contacts will push them apart",
+                body.name
+            ));
+        }
+    }
+}
+
+/// Puts fluid and bodies into one state.
+fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) -> State {
+    let mut bodies = Bodies::default();
+    for (index, b) in new.into_iter().enumerate() {
+        let slots = bodies.offset.len()..bodies.offset.len() + b.offset.len();
+        let mut body = Body {
+            name: b.name,
+            mass: b.mass,
+            inverse_inertia: b.inverse_inertia,
+            slots,
+            ln_restitution: b.restitution.ln(),
+            stiffness: b.stiffness,
+            damping: b.damping,
+            x: b.x,
+            v: b.v,
+            v_half: b.v,
+            q: b.q,
+            l: DVec3::ZERO,
+            l_half: DVec3::ZERO,
+            omega: b.spin,
+            force: DVec3::ZERO,
+            torque: DVec3::ZERO,
+        };
+        if b.mass.is_finite() {
+            let inertia_world = if model.dimensions == 2 {
+                DMat3::from_diagonal(DVec3::Y / b.inverse_inertia.y_axis.y)
+            } else {
+                body.inverse_inertia_at(body.q).inverse()
+            };
+            body.l = inertia_world * b.spin;
+            body.l_half = body.l;
+        }
+        for (offset, volume) in b.offset.into_iter().zip(b.particle_volume) {
+            let mut record = Record { volume: volume as f32, ..Record::default() };
+            crate::integrate::bodies::place(&mut record, &body, offset, model);
+            bodies.offset.push(offset);
+            bodies.owner.push(index as u32);
+            bodies.record.push(record);
+        }
+        bodies.body.push(body);
+        if index + 1 == rigid_count {
+            bodies.rigid_slots = bodies.offset.len();
+        }
+    }
+    let n = fluid.len();
+    let total = n + bodies.record.len();
+    let mut p = Particles {
+        record: Vec::with_capacity(total),
+        push: vec![[0.0; 3]; total],
+        push_before: vec![[0.0; 3]; n],
+        density: vec![1.0; n],
+        carry: if model.solver.xsph > 0.0 { vec![[0.0; 3]; n] } else { Vec::new() },
+        id: (0..n as u32).chain(0..bodies.record.len() as u32).collect(),
+        owner: fluid.iter().map(|f| f.fluid).chain(bodies.owner.iter().copied()).collect(),
+        first: [0, n, n + bodies.rigid_slots],
+        count: [n, bodies.rigid_slots, bodies.record.len() - bodies.rigid_slots],
+    };
+    for Drop { x, v, .. } in fluid {
+        let (mut x, v) = (x.as_vec3().to_array(), v.as_vec3().to_array());
+        model.grid.wrap(&mut x);
+        p.record.push(Record { x, volume: model.volume as f32, v, share: 0.0 });
+    }
+    p.record.extend_from_slice(&bodies.record);
+    debug_assert_eq!(p.len(), p.segment(Kind::Static).end);
+    State { particles: p, bodies }
+}
