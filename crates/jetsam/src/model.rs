@@ -158,7 +158,11 @@ impl Model {
         let reduced_mass = 1.0 / (a.inverse_mass + b.inverse_mass);
         self.contact_constants(
             reduced_mass,
-            0.5 * (a.ln_restitution + b.ln_restitution),
+            match (a.inverse_mass == 0.0, b.inverse_mass == 0.0) {
+                (true, _) => b.ln_restitution, // what does not move takes the restitution of what does
+                (_, true) => a.ln_restitution,
+                _ => 0.5 * (a.ln_restitution + b.ln_restitution),
+            },
             a.shared_by.max(b.shared_by),
             a.stiffness.max(b.stiffness),
             a.damping.max(b.damping),

@@ -92,12 +92,6 @@ pub struct Body {
     pub inverse_inertia: DMat3,
     /// Slots of the body's particles.
     pub slots: Range<usize>,
-    /// Natural logarithm of the restitution (E14).
-    pub ln_restitution: f64,
-    /// Spring constant of one contact if stated (N/m).
-    pub stiffness: Option<f64>,
-    /// Dashpot of one contact if stated (N s/m).
-    pub damping: Option<f64>,
     /// Centre of mass (m).
     pub x: DVec3,
     /// Velocity (m/s).

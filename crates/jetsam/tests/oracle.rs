@@ -16,6 +16,8 @@ struct P {
     x: DVec3,
     v: DVec3,
     volume: f64,
+    /// Inverse mass of what it belongs to: its own for fluid, the body's for bodies.
+    inverse_mass: f64,
 }
 
 fn wendland(s: f64) -> f64 {
@@ -109,6 +111,15 @@ fn oracle(particles: &[P], assembly: &Assembly, period: DVec3) -> Oracle {
                 // Morris: mu_i + mu_j, walls take the fluid's
                 let mu = 2.0 * f64::from(fluid.viscosity);
                 f += volumes * mu * e.dot(gradient) / (r * r + softening) * v;
+                if fluids == 1 && r < m.spacing && share[if p.kind == Kind::Fluid { i } else { j }] <= 0.0 {
+                    // E16 for spray: k = m* (u / overlap)^2, eta = 2 zeta sqrt(k m*), restitution 0.3, along the normal
+                    let reduced = 1.0 / (p.inverse_mass + q.inverse_mass);
+                    let k = reduced * (m.largest_speed / (m.solver.contact_overlap * m.spacing)).powi(2);
+                    let ln_e = 0.3f64.ln();
+                    let eta = 2.0 * -ln_e / (PI * PI + ln_e * ln_e).sqrt() * (k * reduced).sqrt();
+                    let n = e / r;
+                    f += -k * (m.spacing - r) * n + eta * v.dot(n) * n;
+                }
                 if fluids == 2 && v.dot(e) < 0.0 {
                     let eta = m.solver.artificial_viscosity * rho * m.sound_speed * 0.5 * h;
                     f += volumes * eta * v.dot(e) / (r * r + softening) * gradient;
@@ -134,7 +145,17 @@ fn compare(text: &str, disturb: impl Fn(&mut Assembly), period: DVec3) {
         .flat_map(|kind| p.segment(kind).map(move |i| (kind, i)))
         .map(|(kind, i)| {
             let r = p.record[i];
-            P { kind, x: DVec3::from(r.x.map(f64::from)), v: DVec3::from(r.v.map(f64::from)), volume: r.volume.into() }
+            let inverse_mass = match kind {
+                Kind::Fluid => 1.0 / f64::from(assembly.model.fluids[0].mass),
+                _ => 1.0 / assembly.state.bodies.body[p.owner[i] as usize].mass,
+            };
+            P {
+                kind,
+                x: DVec3::from(r.x.map(f64::from)),
+                v: DVec3::from(r.v.map(f64::from)),
+                volume: r.volume.into(),
+                inverse_mass,
+            }
         })
         .collect();
     let expected = oracle(&particles, &assembly, period);

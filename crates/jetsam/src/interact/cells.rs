@@ -77,11 +77,6 @@ impl Grid {
         grid
     }
 
-    /// Whether any axis is periodic.
-    pub fn is_periodic(&self) -> bool {
-        self.period.iter().any(|&p| p > 0.0)
-    }
-
     /// Cell coordinates of a place, clamped to the grid.
     #[inline]
     pub fn coordinates(&self, x: [f32; 3]) -> [i32; 3] {

@@ -79,16 +79,16 @@ fn on_fluid<S: Simd>(simd: S, input: &Input, chunk: &NeighbourChunk, runs: &Runs
     for list in run(Kind::Static) {
         pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);
     }
-    let mut contacts = Vec3::ZERO;
-    match model.solver.coupling {
-        Coupling::Pressure => {
-            for list in run(Kind::Rigid) {
-                pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);
-            }
+    if model.solver.coupling == Coupling::Pressure {
+        for list in run(Kind::Rigid) {
+            pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);
         }
-        Coupling::Spring => {
-            contacts =
-                sum_contacts(input, own, &chunk.list[runs.exact(Kind::Rigid)], |body| model.coupling_pair(owner, body));
+    }
+    let mut contacts = Vec3::ZERO;
+    for kind in [Kind::Rigid, Kind::Static] {
+        if springs(model, kind, own) {
+            let list = &chunk.list[runs.exact(kind)];
+            contacts += sum_contacts(input, own, list, |(_, body)| Some(model.coupling_pair(owner, body)));
         }
     }
     let mut acceleration = (pairs.force(simd) + contacts) / me.mass + model.gravity_f32();
@@ -117,13 +117,14 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, 
             pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);
         }
         force += pairs.force(simd);
-    } else {
-        let fluids = &chunk.list[runs.exact(Kind::Fluid)];
-        force += sum_contacts(input, own, fluids, |fluid| model.coupling_pair(fluid, owner));
     }
+    let fluids = &chunk.list[runs.exact(Kind::Fluid)];
+    force += sum_contacts(input, own, fluids, |(other, fluid)| {
+        springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
+    });
     for other in [Kind::Rigid, Kind::Static] {
         let list = &chunk.list[runs.exact(other)];
-        force += sum_contacts(input, own, list, |body| model.contact_pair(owner, body));
+        force += sum_contacts(input, own, list, |(_, body)| Some(model.contact_pair(owner, body)));
     }
     if kind == Kind::Rigid {
         force += fields(model, own) * input.particle_mass[owner as usize];
@@ -131,9 +132,22 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, 
     force
 }
 
-/// Sum of contact forces (E12) on a particle. `constants` gives spring and dashpot for the other's owner.
+/// Whether a fluid particle meets particles of bodies of a kind by springs (E16): where that is the coupling, and
+/// where the fluid particle has no pressure (spray), as nothing else would hold it outside.
 #[inline(always)]
-fn sum_contacts(input: &Input, own: &Record, list: &[u32], constants: impl Fn(u32) -> (f32, f32)) -> Vec3 {
+fn springs(model: &Model, kind: Kind, fluid: &Record) -> bool {
+    (kind == Kind::Rigid && model.solver.coupling == Coupling::Spring) || fluid.share <= 0.0
+}
+
+/// Sum of contact forces (E12) on a particle. `constants` gives spring and dashpot for the other and its owner, or
+/// `None` where there is no contact.
+#[inline(always)]
+fn sum_contacts(
+    input: &Input,
+    own: &Record,
+    list: &[u32],
+    constants: impl Fn((&Record, u32)) -> Option<(f32, f32)>,
+) -> Vec3 {
     let model = input.model;
     let diameter = model.contact_diameter as f32;
     let normal_only = if model.solver.damping == Damping::Normal { 1.0 } else { 0.0 };
@@ -146,7 +160,7 @@ fn sum_contacts(input: &Input, own: &Record, list: &[u32], constants: impl Fn(u3
             continue; // farther than a pair parts or meets in half a step
         }
         let v = Vec3::from(other.v) - Vec3::from(own.v);
-        let (k, eta) = constants(input.owner[j as usize]);
+        let Some((k, eta)) = constants((other, input.owner[j as usize])) else { continue };
         let f = contact::contact_force(d.to_array(), v.to_array(), r, diameter, k, eta, normal_only, input.dt);
         total += Vec3::new(f.x, f.y, f.z);
     }
