@@ -1299,3 +1299,15 @@ fn the_report_has_the_fields_scripts_rely_on() {
         (Some(6), Some(3))
     );
 }
+
+#[cfg(not(feature = "gpu"))]
+#[test]
+fn without_its_feature_a_gpu_is_refused() {
+    use jetsam::gpu::{GpuError, devices};
+    use jetsam::voxelize::{Backend, Voxelizer};
+    assert!(devices().is_empty() && Voxelizer::new(Backend::Auto).is_ok());
+    assert_eq!(
+        Voxelizer::new(Backend::Gpu).err(),
+        Some(VoxelizeError::Gpu(GpuError::NotBuilt))
+    );
+}

@@ -37,13 +37,21 @@ fn main() -> ExitCode {
     ];
     let absent = devices().is_empty();
     let required = std::env::var("JETSAM_REQUIRE_GPU").is_ok_and(|v| v == "1");
-    let mut trials = vec![
-        Trial::test("the_kernels_are_valid", || Ok(the_kernels_are_valid())),
-        Trial::test("backends_are_reported", || Ok(backends_are_reported())),
+    let trial = |name, test: fn()| {
+        Trial::test(name, move || {
+            test();
+            Ok(())
+        })
+    };
+    let everywhere: [(&str, fn()); 2] = [
+        ("the_kernels_are_valid", the_kernels_are_valid),
+        ("backends_are_reported", backends_are_reported),
     ];
-    trials.extend(tests.map(|(name, test)| {
-        Trial::test(name, move || Ok(test())).with_ignored_flag(absent && !required)
-    }));
+    let on_devices = tests
+        .into_iter()
+        .map(|(name, test)| trial(name, test).with_ignored_flag(absent && !required));
+    let mut trials: Vec<Trial> = everywhere.map(|(name, test)| trial(name, test)).into();
+    trials.extend(on_devices);
     run(&Arguments::from_args(), trials).exit_code()
 }
 

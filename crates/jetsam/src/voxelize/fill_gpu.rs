@@ -25,6 +25,9 @@ use crate::gpu::{Gpu, GpuError};
 
 /// Bytes of the grid in one pass, unless one slice takes more.
 const PASS_BYTES: u64 = 32 << 20;
+/// Pairs of a triangle and a slice in one pass, unless one slice has more: leaves room to number the invocations of a
+/// dispatch that is folded into two dimensions.
+const MOST_PAIRS: u32 = 1 << 31;
 /// Invocations in a workgroup of the kernels.
 const GROUP: u32 = 64;
 /// Rows for one invocation of `toggle`, at most: `BAND` of the kernels.
@@ -144,9 +147,8 @@ impl FillGpu {
             Ok((vertices, corners))
         })?;
         let per_slice = grid.slice_words();
-        // Few enough slices that a pass has at most u32::MAX pairs of a triangle and a slice.
-        let fit = (PASS_BYTES / (8 * per_slice as u64)).min(u64::from(u32::MAX / triangles));
-        let step = (fit.clamp(1, u64::from(nz))) as u32;
+        let fit = (PASS_BYTES / (8 * per_slice as u64)).min(u64::from(MOST_PAIRS / triangles));
+        let step = fit.clamp(1, u64::from(nz)) as u32;
         for first in (0..nz).step_by(step as usize) {
             let (spans, pairs) = spans(shape, nz, first..(first + step).min(nz));
             if pairs == 0 {

@@ -17,6 +17,8 @@ pub struct Voxelizer {
     backend: Backend,
     #[cfg(feature = "gpu")]
     gpu: Option<FillGpu>,
+    /// Why there is a GPU but it was not opened.
+    fault: Option<GpuError>,
 }
 
 /// What did the work, for the report.
@@ -36,21 +38,31 @@ impl Voxelizer {
     /// # Errors
     /// [`Backend::Gpu`] without a GPU that works, or without the feature `gpu`.
     pub fn new(backend: Backend) -> Result<Voxelizer, VoxelizeError> {
-        #[cfg(feature = "gpu")]
-        {
-            let open = |only_hardware| crate::gpu::Gpu::open(only_hardware).and_then(FillGpu::new);
-            let gpu = match backend {
-                Backend::Cpu => None,
-                Backend::Auto => open(true).ok(),
-                Backend::Gpu => Some(open(false).map_err(VoxelizeError::Gpu)?),
-            };
-            Ok(Voxelizer { backend, gpu })
+        let mut voxelizer = Voxelizer {
+            backend,
+            ..Voxelizer::default()
+        };
+        match (backend, voxelizer.open()) {
+            (Backend::Gpu, Err(fault)) => return Err(VoxelizeError::Gpu(fault)),
+            (_, Err(GpuError::NoAdapter | GpuError::NotBuilt)) | (_, Ok(())) => {}
+            (_, Err(fault)) => voxelizer.fault = Some(fault),
         }
-        #[cfg(not(feature = "gpu"))]
-        match backend {
-            Backend::Gpu => Err(VoxelizeError::Gpu(GpuError::NotBuilt)),
-            _ => Ok(Voxelizer { backend }),
+        Ok(voxelizer)
+    }
+
+    /// Opens the GPU, if one is wanted.
+    #[cfg(feature = "gpu")]
+    fn open(&mut self) -> Result<(), GpuError> {
+        if self.backend != Backend::Cpu {
+            let gpu = crate::gpu::Gpu::open(self.backend == Backend::Auto)?;
+            self.gpu = Some(FillGpu::new(gpu)?);
         }
+        Ok(())
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn open(&mut self) -> Result<(), GpuError> {
+        Err(GpuError::NotBuilt)
     }
 
     /// Turns the mesh into cells.
@@ -75,11 +87,14 @@ impl Voxelizer {
 
     /// What will do the work by that rule, for the report.
     pub(super) fn plan(&self, rule: Rule) -> Ran {
-        let asked_in_vain = self.backend == Backend::Gpu && rule == Rule::Winding;
-        Ran {
-            instead: asked_in_vain.then(|| {
+        let instead = match rule {
+            Rule::Parity => self.fault.as_ref().map(stepped_in),
+            Rule::Winding => (self.backend == Backend::Gpu).then(|| {
                 "the winding rule ran on the CPU: only the parity rule has a GPU twin".into()
             }),
+        };
+        Ran {
+            instead,
             ..Ran::default()
         }
     }
@@ -97,7 +112,7 @@ impl Voxelizer {
                 return Err(VoxelizeError::Gpu(fault));
             }
             Some(Err(fault)) => {
-                ran.instead = Some(format!("the CPU stepped in for the GPU: {fault}"));
+                ran.instead = Some(stepped_in(&fault));
                 *grid = BitGrid::new(grid.dims());
             }
             None => {}
@@ -130,4 +145,8 @@ impl Voxelizer {
     ) -> Option<Result<Vec<u64>, GpuError>> {
         None
     }
+}
+
+fn stepped_in(fault: &GpuError) -> String {
+    format!("the CPU stepped in for the GPU: {fault}")
 }
