@@ -118,6 +118,21 @@ impl DeviceInfo {
     pub fn is_hardware(&self) -> bool {
         self.kind < DeviceKind::Unknown
     }
+
+    /// An error unless a buffer of that size can be bound.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn holds(&self, what: &'static str, needs: u64) -> Result<(), GpuError> {
+        let limit = self.max_buffer_bytes;
+        if needs <= limit {
+            return Ok(());
+        }
+        Err(GpuError::Limit {
+            what,
+            needs,
+            limit,
+            device: self.name.clone(),
+        })
+    }
 }
 
 /// The devices of this machine, the most welcome first. Empty without the feature `gpu`.
@@ -262,19 +277,28 @@ mod device {
                 reason: reason.to_string(),
             }
         }
+    }
+}
 
-        /// An error unless a buffer of that size can be bound.
-        pub fn check_size(&self, what: &'static str, needs: u64) -> Result<(), GpuError> {
-            let limit = self.info.max_buffer_bytes;
-            if needs <= limit {
-                return Ok(());
-            }
-            Err(GpuError::Limit {
-                what,
-                needs,
-                limit,
-                device: self.info.name.clone(),
-            })
-        }
+#[cfg(all(test, feature = "gpu"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_named() {
+        let info = DeviceInfo {
+            name: "a card".into(),
+            kind: DeviceKind::Discrete,
+            api: "vulkan".into(),
+            driver: String::new(),
+            max_buffer_bytes: 128 << 20,
+        };
+        assert!(info.is_hardware() && info.holds("vertices", 128 << 20).is_ok());
+        let fault = info.holds("vertices", (128 << 20) + 1).unwrap_err();
+        assert_eq!(
+            fault.to_string(),
+            "vertices take 134217729 bytes, but a card holds 134217728 in one buffer"
+        );
+        assert!(fault.help().is_some());
     }
 }

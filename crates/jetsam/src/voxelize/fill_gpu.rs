@@ -186,7 +186,7 @@ impl FillGpu {
         let device = &self.gpu.device;
         let rows = params.ny * params.slices;
         let sizes = [words.len() as u64 * 8, u64::from(rows.div_ceil(32)) * 4];
-        self.gpu.check_size("the cells of a pass", sizes[0])?;
+        self.gpu.info.holds("the cells of a pass", sizes[0])?;
         let settings = self.buffer("parameters", 32, Usage::UNIFORM | Usage::COPY_DST);
         self.gpu
             .queue
@@ -276,7 +276,7 @@ impl FillGpu {
 
     /// A buffer with these bytes, for kernels to read.
     fn input(&self, what: &'static str, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
-        self.gpu.check_size(what, bytes.len() as u64)?;
+        self.gpu.info.holds(what, bytes.len() as u64)?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         let buffer = self.buffer(what, bytes.len() as u64, usage);
         self.gpu.queue.write_buffer(&buffer, 0, bytes);
