@@ -38,6 +38,7 @@
 pub mod assemble;
 pub mod backend;
 pub mod error;
+pub mod gpu;
 pub mod integrate;
 pub mod interact;
 pub mod laws;

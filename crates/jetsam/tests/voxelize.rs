@@ -904,3 +904,12 @@ fn the_report_has_the_fields_scripts_rely_on() {
     assert_eq!((json["rule"].as_str(), json["backend"].as_str()), (Some("winding"), Some("cpu")));
     assert_eq!((json["inertia"].as_array().map(Vec::len), json["com"].as_array().map(Vec::len)), (Some(6), Some(3)));
 }
+
+#[cfg(not(feature = "gpu"))]
+#[test]
+fn without_its_feature_a_gpu_is_refused() {
+    use jetsam::gpu::{GpuError, devices};
+    use jetsam::voxelize::{Backend, Voxelizer};
+    assert!(devices().is_empty() && Voxelizer::new(Backend::Auto).is_ok());
+    assert_eq!(Voxelizer::new(Backend::Gpu).err(), Some(VoxelizeError::Gpu(GpuError::NotBuilt)));
+}

@@ -40,6 +40,12 @@ impl BitGrid {
         &self.words
     }
 
+    /// All words, to be filled. The last word of a row must keep its zeros.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn words_mut(&mut self) -> &mut [u64] {
+        &mut self.words
+    }
+
     /// Takes all words anew.
     pub(crate) fn set_words(&mut self, words: impl Iterator<Item = u64>) {
         self.words.iter_mut().zip(words).for_each(|(word, new)| *word = new);

@@ -11,11 +11,13 @@
 //! the last cell.
 //!
 //! The chapter's parts: `lattice` places the cells, `raster` finds exactly where rows pass through triangles, `fill` turns
-//! that into cells by either rule, `rim` and `tree` know the winding number of open meshes, `thin` rescues what is thinner
+//! that into cells by either rule, `fill_gpu` does the parity rule on the GPU, `voxelizer` chooses between them, `rim` and `tree` know the winding number of open meshes, `thin` rescues what is thinner
 //! than a cell, `surface` samples surfaces instead of solids.
 
 mod bits;
 mod fill;
+#[cfg(feature = "gpu")]
+mod fill_gpu;
 mod lattice;
 mod options;
 mod raster;
@@ -24,6 +26,7 @@ mod rim;
 mod surface;
 mod thin;
 mod tree;
+mod voxelizer;
 
 use std::time::Instant;
 
@@ -33,12 +36,14 @@ use crate::mesh::{Mesh, topology};
 use fill::Shape;
 use lattice::{Lattice, Placed};
 use rim::{Rim, Side};
+use voxelizer::Ran;
 
 pub use bits::BitGrid;
-pub use options::{Align, Resolution, Rule, VoxelizeError, VoxelizeOptions};
+pub use options::{Align, Backend, Resolution, Rule, VoxelizeError, VoxelizeOptions};
 pub use report::VoxelReport;
 pub use surface::sample_surface;
 pub use tree::{WindingTree, solid_angle, winding_number};
+pub use voxelizer::Voxelizer;
 
 /// A mesh as cells of a regular lattice.
 #[derive(Clone, Debug)]
@@ -87,12 +92,16 @@ impl Voxels {
     }
 }
 
-/// Turns the mesh into cells.
+/// Turns the mesh into cells, on the CPU; a [`Voxelizer`] does it on other backends.
 ///
 /// # Errors
 /// The mesh has no triangles, an index out of range or a vertex that is not finite; an option is out of range; the cells
 /// would be more than `options.max_cells`. Memory is checked before it is taken.
 pub fn voxelize(mesh: &Mesh, options: &VoxelizeOptions) -> Result<Voxels, VoxelizeError> {
+    Voxelizer::default().voxelize(mesh, options)
+}
+
+fn run(on: &Voxelizer, mesh: &Mesh, options: &VoxelizeOptions) -> Result<Voxels, VoxelizeError> {
     let started = Instant::now();
     mesh.check().map_err(VoxelizeError::Mesh)?;
     options.check()?;
@@ -102,9 +111,9 @@ pub fn voxelize(mesh: &Mesh, options: &VoxelizeOptions) -> Result<Voxels, Voxeli
         return Err(VoxelizeError::Point);
     }
     let mut solid = match options.resolution {
-        Resolution::Spacing(spacing) => attempt(mesh, &placed, options, spacing, 0)?,
-        Resolution::Across(cells) => attempt(mesh, &placed, options, longest / f64::from(cells), 0)?,
-        Resolution::Particles(wanted) => search(mesh, &placed, options, wanted)?,
+        Resolution::Spacing(spacing) => attempt(on, mesh, &placed, options, spacing, 0)?,
+        Resolution::Across(cells) => attempt(on, mesh, &placed, options, longest / f64::from(cells), 0)?,
+        Resolution::Particles(wanted) => search(on, mesh, &placed, options, wanted)?,
     };
     let report = report::write(mesh, &placed, options, &mut solid, started);
     let Solid { lattice: Lattice { spacing, origin, dims }, bits, .. } = solid;
@@ -125,10 +134,12 @@ struct Solid {
     overlap: i32,
     /// Rows decided by winding number although the rule is parity.
     mended_rows: usize,
+    ran: Ran,
 }
 
 /// Fills the lattice of one spacing.
 fn attempt(
+    on: &Voxelizer,
     mesh: &Mesh,
     placed: &Placed,
     options: &VoxelizeOptions,
@@ -156,11 +167,12 @@ fn attempt(
         flipped_shells: topology.flipped_shells,
         overlap: 0,
         mended_rows: 0,
+        ran: on.plan(options.rule),
     };
     match options.rule {
         Rule::Winding => solid.overlap = fill::winding(&shape, &rim_of(&shape), &mut solid.bits, None),
         Rule::Parity => {
-            let odd = fill::parity(&shape, &mut solid.bits);
+            let odd = on.parity(&shape, &mut solid.bits, &mut solid.ran)?;
             solid.mended_rows = odd.len();
             if !odd.is_empty() {
                 fill::winding(&shape, &rim_of(&shape), &mut solid.bits, Some(&odd));
@@ -188,7 +200,13 @@ fn rim_of(shape: &Shape) -> Rim {
 
 /// Looks for the spacing that gives the wanted number of particles within 2 %. The number falls with the cube of the
 /// spacing but for the grain of the lattice; on a body the lattice can also be shifted by half a cell.
-fn search(mesh: &Mesh, placed: &Placed, options: &VoxelizeOptions, wanted: u64) -> Result<Solid, VoxelizeError> {
+fn search(
+    on: &Voxelizer,
+    mesh: &Mesh,
+    placed: &Placed,
+    options: &VoxelizeOptions,
+    wanted: u64,
+) -> Result<Solid, VoxelizeError> {
     let goal = wanted as f64;
     let size = placed.hi - placed.lo;
     let volume = mesh.mass_properties().volume.abs();
@@ -206,7 +224,7 @@ fn search(mesh: &Mesh, placed: &Placed, options: &VoxelizeOptions, wanted: u64) 
             let step = f64::from(round / 8) * 0.01 * if round % 2 == 0 { 1.0 } else { -1.0 };
             spacing = best.lattice.spacing * (1.0 + step);
         }
-        let solid = attempt(mesh, placed, options, spacing, shift)?;
+        let solid = attempt(on, mesh, placed, options, spacing, shift)?;
         let ratio = (solid.count.max(1) as f64 / goal).clamp(0.02, 50.0);
         // A shell's particles grow with the square of the resolution, not the cube.
         spacing *= ratio.powf(if options.shell.is_some() { 0.4 } else { 1.0 / 3.0 });

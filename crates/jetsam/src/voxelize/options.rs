@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::gpu::GpuError;
 use crate::mesh::MeshFault;
 
 /// When a cell is solid.
@@ -43,6 +44,19 @@ pub enum Align {
     Body,
     /// The world's axes: cell centres at odd multiples of half the spacing, wherever the mesh is.
     World,
+}
+
+/// What does the work. The cells are the same to the last bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Backend {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// The parity rule on a GPU, or on a software driver where there is no other; an error where there is neither.
+    Gpu,
+    /// The parity rule on a GPU if there is one in fact; else the processor.
+    Auto,
 }
 
 /// Options of [`super::voxelize`].
@@ -115,6 +129,10 @@ pub enum VoxelizeError {
         help("`jetsam voxelize --json` on the file tells more; export it again")
     )]
     Mesh(MeshFault),
+    /// The GPU asked for did not do it.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Gpu(GpuError),
     /// All triangles lie in one point.
     #[error("the mesh has no extent")]
     #[diagnostic(code(jetsam::voxelize::point), help("check the mesh's scale: all its vertices lie in one point"))]

@@ -40,8 +40,11 @@ pub struct VoxelReport {
     pub rule: Rule,
     /// Wall time of the whole voxelization.
     pub millis: f64,
-    /// What did the work: `cpu`.
+    /// What did the work: `cpu`, or `gpu: ` and the device.
     pub backend: String,
+    /// Time of the GPU's kernels, where it has a clock.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kernel_millis: Option<f64>,
     /// What the user should know, one sentence each; empty when all is well.
     pub warnings: Vec<String>,
 }
@@ -85,6 +88,7 @@ pub(super) fn write(
         format!("{} rows passed through a hole and were decided by winding number", solid.mended_rows),
     );
     warn(solid.count == 0, "no cell is solid: use a smaller spacing, or `thin`".into());
+    warn(solid.ran.instead.is_some(), solid.ran.instead.take().unwrap_or_default());
     let ratio = volume_particles / of_mesh.volume.abs();
     warn(
         solid.watertight && options.shell.is_none() && !(0.75..=1.25).contains(&ratio),
@@ -108,7 +112,8 @@ pub(super) fn write(
         flipped_shells: solid.flipped_shells,
         rule: options.rule,
         millis: started.elapsed().as_secs_f64() * 1e3,
-        backend: "cpu".into(),
+        backend: solid.ran.device.take().unwrap_or_else(|| "cpu".into()),
+        kernel_millis: solid.ran.kernel_millis,
         warnings,
     }
 }
