@@ -27,6 +27,8 @@ pub enum Command {
     Bench(Bench),
     /// List the built-in scenes.
     Scenes(Scenes),
+    /// List the compute adapters that were found.
+    Devices(Devices),
     /// Print the JSON schema of the scene file.
     Schema,
     /// Print completions for a shell.
@@ -128,6 +130,27 @@ pub struct Check {
     pub json: bool,
 }
 
+/// What fills a mesh.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Filler {
+    /// A graphics processor where there is one, else the processor.
+    Auto,
+    /// The processor.
+    Cpu,
+    /// A graphics processor.
+    Gpu,
+}
+
+impl From<Filler> for jetsam::voxelize::Backend {
+    fn from(filler: Filler) -> Self {
+        match filler {
+            Filler::Auto => Self::Auto,
+            Filler::Cpu => Self::Cpu,
+            Filler::Gpu => Self::Gpu,
+        }
+    }
+}
+
 #[derive(clap::Args)]
 #[command(group = ArgGroup::new("fineness").required(true).args(["spacing", "resolution", "particles"]))]
 pub struct Voxelize {
@@ -145,6 +168,9 @@ pub struct Voxelize {
     /// When a place is inside: where the surface is crossed an odd number of times, or where it winds around.
     #[arg(long, value_parser = rule, default_value = "winding", value_name = "parity|winding")]
     pub rule: Rule,
+    /// What fills the mesh: the parity rule has a GPU twin, equal to the last cell.
+    #[arg(long, value_enum, default_value = "cpu")]
+    pub backend: Filler,
     /// Keep parts thinner than two particles.
     #[arg(long)]
     pub thin: bool,
@@ -161,6 +187,13 @@ pub struct Voxelize {
     #[arg(long, requires = "out", value_name = "K", value_parser = clap::value_parser!(u8).range(1..=24))]
     pub series: Option<u8>,
     /// Print one JSON object (with --series: one a picture).
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Devices {
+    /// Print a JSON array.
     #[arg(long)]
     pub json: bool,
 }

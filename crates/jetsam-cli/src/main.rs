@@ -6,6 +6,7 @@
 mod args;
 mod bench;
 mod check;
+mod devices;
 mod output;
 mod run;
 mod scenes;
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
         Command::Voxelize(voxelize) => voxelize::voxelize(&voxelize),
         Command::Bench(bench) => bench::bench(&bench),
         Command::Scenes(scenes) => scenes::scenes(&scenes),
+        Command::Devices(devices) => devices::devices(&devices),
         Command::Schema => schema::schema(),
         Command::Completions { shell } => shell::completions(shell),
         Command::Man => shell::man(),

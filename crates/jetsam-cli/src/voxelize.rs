@@ -5,7 +5,7 @@ use crate::terminal::{print, print_json, say, table};
 use crate::{Outcome, args};
 use glam::{DQuat, DVec3};
 use jetsam::mesh::Mesh;
-use jetsam::voxelize::{Resolution, VoxelReport, VoxelizeOptions, voxelize as fill};
+use jetsam::voxelize::{Resolution, VoxelReport, VoxelizeOptions, Voxelizer};
 use miette::IntoDiagnostic;
 use std::io::Write;
 use std::path::Path;
@@ -14,8 +14,9 @@ use std::path::Path;
 pub fn voxelize(args: &args::Voxelize) -> miette::Result<Outcome> {
     let mesh = Mesh::load(&args.mesh)?;
     let mut options = options(args)?;
+    let voxelizer = Voxelizer::new(args.backend.into())?;
     let Some(count) = args.series else {
-        let voxels = fill(&mesh, &options)?;
+        let voxels = voxelizer.voxelize(&mesh, &options)?;
         if let Some(path) = &args.out {
             let mut file = output::create(path)?;
             ply::write_points(&mut file, &voxels.points()).and_then(|()| file.flush()).map_err(output::at(path))?;
@@ -26,7 +27,7 @@ pub fn voxelize(args: &args::Voxelize) -> miette::Result<Outcome> {
     let folder = args.out.as_deref().unwrap_or(Path::new("out"));
     std::fs::create_dir_all(folder).map_err(output::at(folder))?;
     for step in 0..u32::from(count) {
-        let voxels = fill(&mesh, &options)?;
+        let voxels = voxelizer.voxelize(&mesh, &options)?;
         let image = pictures::of_points(&voxels.points(), voxels.spacing);
         image.save_png(folder.join(format!("series_{step:02}.png"))).into_diagnostic()?;
         show(&voxels.report, args.json);
