@@ -130,6 +130,24 @@ pub struct Check {
     pub json: bool,
 }
 
+/// What a lattice follows.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Align {
+    /// The mesh's own axes.
+    Body,
+    /// The world's axes.
+    World,
+}
+
+impl From<Align> for jetsam::voxelize::Align {
+    fn from(align: Align) -> Self {
+        match align {
+            Align::Body => Self::Body,
+            Align::World => Self::World,
+        }
+    }
+}
+
 /// What fills a mesh.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Filler {
@@ -174,6 +192,12 @@ pub struct Voxelize {
     /// Keep parts thinner than two particles.
     #[arg(long)]
     pub thin: bool,
+    /// What the lattice follows: the mesh as it is turned, or the world's axes.
+    #[arg(long, value_enum, default_value = "body")]
+    pub align: Align,
+    /// Keep only a shell of this thickness under the surface, in mesh units.
+    #[arg(long, value_name = "THICKNESS", allow_negative_numbers = true)]
+    pub shell: Option<f64>,
     /// Where the mesh's origin goes.
     #[arg(long, value_parser = numbers::<3>, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub offset: Option<[f64; 3]>,

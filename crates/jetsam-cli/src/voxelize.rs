@@ -62,6 +62,8 @@ fn options(args: &args::Voxelize) -> miette::Result<VoxelizeOptions> {
         offset: args.offset.map_or(DVec3::ZERO, DVec3::from),
         rotation,
         thin: args.thin,
+        align: args.align.into(),
+        shell: args.shell,
         ..VoxelizeOptions::default()
     })
 }
