@@ -69,6 +69,7 @@ fn restitution(masses: [f64; 2], eta: f64, v: f64, dt: f64) -> (f64, f64, Collis
     let error = |c: &Collision| c.restitution - e;
     let mean = collisions.iter().map(error).sum::<f64>() / 8.0;
     let worst = collisions.iter().map(|c| error(c).abs()).fold(0.0, f64::max);
+    println!("e = {e:.6}, dt = t_c / {:.0}: mean error {mean:+.5}, worst {worst:.5}", contact / dt);
     (mean, worst, collisions.into_iter().last().unwrap())
 }
 
@@ -105,7 +106,9 @@ fn bounce(text: &str, dt: f64, steps: usize) -> (f64, f64) {
         world.step(dt);
         lowest = lowest.min(world.state().bodies.body[0].x.z);
     }
-    (world.state().bodies.body[0].v.z / -before.z, lowest)
+    let e = world.state().bodies.body[0].v.z / -before.z;
+    println!("e = {e:.6}, lowest {lowest:.6e}");
+    (e, lowest)
 }
 
 #[test]
