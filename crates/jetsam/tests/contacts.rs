@@ -180,8 +180,8 @@ fn the_full_dashpot_damps_the_tangent_too_and_the_normal_one_does_not() {
 fn without_damping_all_comes_back() {
     // e = 1 holds to 1e-3 at a tenth of the contact time
     let t_c = PI * (0.5f64 / 1e5).sqrt();
-    let (mean, _, _) = restitution([1.0, 1.0], 0.0, 1.0, t_c / 10.0);
-    assert!(mean.abs() < 1e-3, "{mean}");
+    let (_, worst, _) = restitution([1.0, 1.0], 0.0, 1.0, t_c / 10.0);
+    assert!(worst < 1e-3, "{worst}");
 }
 
 #[test]

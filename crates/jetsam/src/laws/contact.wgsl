@@ -13,12 +13,19 @@ fn contact_fraction(overlap: f32, speed: f32, dt: f32) -> f32 {
   return select(now, part, travel > 0.0);
 }
 
+// Mean overlap over the same part of the step: the spring sets in with a kink, met to second order alike.
+fn contact_overlap(overlap: f32, speed: f32, dt: f32) -> f32 {
+  let half = 0.5 * abs(speed) * dt;
+  let ramp = (overlap + half) * (overlap + half) / max(4.0 * half, 1e-30);
+  return select(max(overlap, 0.0), ramp, abs(overlap) < half);
+}
+
 // E12: force on i. The force on j is its exact opposite.
 fn contact_force(d_ij: vec3<f32>, v_ij: vec3<f32>, r: f32, diameter: f32, k: f32, eta: f32, normal_only: f32, dt: f32) -> vec3<f32> {
   let inverse_r = 1.0 / max(r, 1e-12);
   let overlap = diameter - r;
-  let spring = -k * max(overlap, 0.0) * inverse_r;                             // E10
   let speed = dot(v_ij, d_ij) * inverse_r;
+  let spring = -k * contact_overlap(overlap, speed, dt) * inverse_r;                     // E10
   let dashpot = v_ij * (1.0 - normal_only) + d_ij * (speed * inverse_r * normal_only);   // E11
   return d_ij * spring + dashpot * (eta * contact_fraction(overlap, speed, dt));
 }
