@@ -271,21 +271,9 @@ impl NewBody {
         if dimensions == 2 {
             x.y = 0.0;
         }
-        Self {
-            name,
-            offset: solid.points.iter().map(|p| *p - solid.center).collect(),
-            particle_volume: Vec::new(),
-            x,
-            q: turn,
-            v: DVec3::ZERO,
-            spin: DVec3::ZERO,
-            mass: f64::INFINITY,
-            inverse_inertia: DMat3::ZERO,
-            restitution: crate::params::default::rigid_restitution(),
-            stiffness: None,
-            damping: None,
-            mesh: solid.mesh.clone().map(|m| (m, solid.center)),
-        }
+        let offset = solid.points.iter().map(|p| *p - solid.center).collect();
+        let mesh = solid.mesh.clone().map(|m| (m, solid.center));
+        Self { x, q: turn, mesh, ..Self::fixed(name, offset) }
     }
 
     fn fixed(name: String, points: Vec<DVec3>) -> Self {
