@@ -49,6 +49,8 @@ params! {
     sound_speed: "solver.sound_speed", "m/s", _, 1e-9, 1e6;
     artificial_viscosity: "solver.artificial_viscosity", "1", 0.05, 0.0, 10.0;
     xsph: "solver.xsph", "1", 0.0, 0.0, 1.0;
+    shifting: "solver.shifting", "1", 0.0, 0.0, 5.0;
+    density_diffusion: "solver.density_diffusion", "1", 0.1, 0.0, 1.0;
     dt: "solver.dt", "s", _, 1e-12, 1e3;
     courant: "solver.courant", "1", 0.4, 1e-3, 1.0;
     courant_force: "solver.courant_force", "1", 0.25, 1e-3, 1.0;

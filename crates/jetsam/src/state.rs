@@ -49,10 +49,13 @@ pub struct Particles {
     pub push: Vec<[f32; 3]>,
     /// Acceleration of the step before (m/s^2), fluid only. Kept by cells for the kick.
     pub push_before: Vec<[f32; 3]>,
-    /// Relative density `D = rho / rho_0`, fluid only. Written by density.
+    /// Relative density `D = rho / rho_0`, fluid only. Written by density, or where it is integrated by drift and kick.
     pub density: Vec<f32>,
-    /// Velocity added by XSPH (m/s), fluid only; empty when XSPH is off. Written by forces.
-    pub carry: Vec<[f32; 3]>,
+    /// `dD/dt` one and two steps ago (1/s), fluid only; empty where densities are summed. Written by drift.
+    pub rate: Vec<[f32; 2]>,
+    /// Velocity added by XSPH and shifting (m/s) and, last, `dD/dt` now (1/s), fluid only; empty when none of them is on.
+    /// Written by forces.
+    pub carry: Vec<[f32; 4]>,
     /// Fluid: identity, counted over all fluids from 0. Bodies: slot in [`Bodies`]. Permuted by cells.
     pub id: Vec<u32>,
     /// Index of the fluid or of the body the particle belongs to. Permuted by cells.

@@ -8,6 +8,10 @@ use crate::model::{ContactModel, DtBound, Factors, FluidModel, Model};
 use crate::scene::{Coupling, EquationOfState, Scene, Start};
 use glam::DVec3;
 
+/// Reynolds number of a spacing below which walls show a mirrored velocity to viscosity: above, the layer that does not slip
+/// is thinner than particles can show.
+const NO_SLIP_BELOW: f64 = 1000.0;
+
 /// A fluid particle on its way into the state.
 pub(super) struct Drop {
     /// Place (m).
@@ -16,6 +20,8 @@ pub(super) struct Drop {
     pub(super) v: DVec3,
     /// Index of its fluid.
     pub(super) fluid: u32,
+    /// Relative density `D`.
+    pub(super) density: f64,
 }
 
 impl Scene {
@@ -50,7 +56,7 @@ impl Scene {
                     if self.world.dimensions == 2 {
                         v.y = 0.0;
                     }
-                    fluid.push(Drop { x: p, v, fluid: index as u32 });
+                    fluid.push(Drop { x: p, v, fluid: index as u32, density: 1.0 });
                 }
             }
             if fluid.len() == before {
@@ -81,6 +87,7 @@ impl Scene {
                 viscosity: f.viscosity as f32,
                 stiffness: (sound_speed * sound_speed * f.density) as f32,
                 artificial: (self.solver.artificial_viscosity * f.density * sound_speed * 0.5 * support) as f32,
+                diffusion: (self.solver.density_diffusion * 0.5 * support / (sound_speed * f.density)) as f32,
             })
             .collect();
         let contacts = bodies
@@ -111,6 +118,8 @@ impl Scene {
             contact_diameter: self.solver.contact_diameter * spacing,
             solver: self.solver.clone(),
             dt_bounds: Vec::new(),
+            no_slip: !self.solver.walls_slip
+                && self.fluid.iter().any(|f| f.density * largest_speed * spacing < NO_SLIP_BELOW * f.viscosity),
             full_support: if self.world.dimensions == 3 {
                 4.0 / 3.0 * std::f64::consts::PI * self.solver.support.powi(3)
             } else {
@@ -190,7 +199,13 @@ impl Scene {
             };
             for p in fluid.iter_mut().filter(|p| p.fluid == index as u32) {
                 let y = p.x.dot(up) - bottom;
-                p.x += (squeezed(y) - y) * up;
+                let now = squeezed(y);
+                p.x += (now - y) * up;
+                let above = g * (squeezed(depth) - now).max(0.0) / c_sq;
+                p.density = match self.solver.equation_of_state {
+                    EquationOfState::Linear => above.exp(),
+                    EquationOfState::Tait => (1.0 + 6.0 * above).powf(1.0 / 6.0),
+                };
             }
         }
     }

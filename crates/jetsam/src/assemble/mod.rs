@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::interact::cells::Grid;
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::scene::{Scene, Shape, Wall};
+use crate::scene::{Density, Scene, Shape, Wall};
 use crate::state::{Bodies, Body, Kind, Particles, Record, State};
 use bodies::NewBody;
 use fluid::Drop;
@@ -205,12 +205,15 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
     }
     let n = fluid.len();
     let total = n + bodies.record.len();
+    let integrated = model.solver.density == Density::Continuity;
+    let carried = integrated || model.solver.xsph > 0.0 || model.solver.shifting > 0.0;
     let mut p = Particles {
         record: Vec::with_capacity(total),
         push: vec![[0.0; 3]; total],
         push_before: vec![[0.0; 3]; n],
-        density: vec![1.0; n],
-        carry: if model.solver.xsph > 0.0 { vec![[0.0; 3]; n] } else { Vec::new() },
+        density: fluid.iter().map(|f| f.density as f32).collect(),
+        rate: if integrated { vec![[0.0; 2]; n] } else { Vec::new() },
+        carry: if carried { vec![[0.0; 4]; n] } else { Vec::new() },
         id: (0..n as u32).chain(0..bodies.record.len() as u32).collect(),
         owner: fluid.iter().map(|f| f.fluid).chain(bodies.owner.iter().copied()).collect(),
         first: [0, n, n + bodies.rigid_slots],

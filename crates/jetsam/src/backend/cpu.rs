@@ -10,6 +10,7 @@ use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
 use crate::interact::{CHUNK, boundary, density, forces, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
+use crate::scene::Density;
 use crate::stage::Stage;
 use crate::state::{Kind, Record, State};
 use fearless_simd::{Level, dispatch};
@@ -28,6 +29,8 @@ pub struct Cpu {
     /// Where the particle of each rigid or static slot stands.
     place: Vec<AtomicU32>,
     share: Vec<f32>,
+    /// Velocities that bodies' particles show to viscosity (m/s), all particles; empty where they show their own.
+    mirror: Vec<[f32; 4]>,
     parts: Vec<bodies::Part>,
     particle_mass: Vec<f32>,
     sums: Vec<Ledger>,
@@ -41,6 +44,8 @@ struct Spare {
     record: Vec<Record>,
     id: Vec<u32>,
     owner: Vec<u32>,
+    density: Vec<f32>,
+    rate: Vec<[f32; 2]>,
 }
 
 impl Default for Cpu {
@@ -53,6 +58,7 @@ impl Default for Cpu {
             spare: Spare::default(),
             place: Vec::new(),
             share: Vec::new(),
+            mirror: Vec::new(),
             parts: Vec::new(),
             particle_mass: Vec::new(),
             sums: Vec::new(),
@@ -69,7 +75,13 @@ impl Backend for Cpu {
 
     fn upload(&mut self, state: State) {
         let p = &state.particles;
-        self.spare = Spare { record: p.record.clone(), id: p.id.clone(), owner: p.owner.clone() };
+        self.spare = Spare {
+            record: p.record.clone(),
+            id: p.id.clone(),
+            owner: p.owner.clone(),
+            density: p.density.clone(),
+            rate: p.rate.clone(),
+        };
         self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
         self.share = vec![0.0; state.particles.record.len()];
         self.parts = bodies::parts(&state.bodies.body);
@@ -123,6 +135,13 @@ impl Cpu {
                 particles::drift(model.solver.integrator, advance, &model.grid, records, push, carry);
             },
         );
+        if !p.rate.is_empty() {
+            let n = p.count[Kind::Fluid as usize];
+            chunks_mut!(p.density, ..n)
+                .zip(chunks_mut!(p.rate, ..n))
+                .zip(p.carry[..n].par_chunks(CHUNK))
+                .for_each(|((density, rate), carry)| particles::predict(advance, density, rate, carry));
+        }
         if advance.drag == 0.0 {
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::drift(body, model, advance.dt));
             bodies::follow(b, model);
@@ -157,6 +176,19 @@ impl Cpu {
                     owner[k] = from.owner[place];
                 }
             });
+        if !p.rate.is_empty() {
+            std::mem::swap(&mut p.density, &mut from.density);
+            std::mem::swap(&mut p.rate, &mut from.rate);
+            chunks_mut!(p.density, ..n).zip(chunks_mut!(p.rate, ..n)).zip(cells.order[..n].par_chunks(CHUNK)).for_each(
+                |((density, rate), order)| {
+                    for (k, place) in order.iter().enumerate() {
+                        let place = place.load(Relaxed) as usize;
+                        density[k] = from.density[place];
+                        rate[k] = from.rate[place];
+                    }
+                },
+            );
+        }
         p.count[Kind::Fluid as usize] = living;
 
         self.copy_bodies(grid, Kind::Rigid);
@@ -214,7 +246,7 @@ impl Cpu {
             let chunks = &mut self.neighbours[kind as usize];
             chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
             let members = |c: usize| first + c * CHUNK..first + ((c + 1) * CHUNK).min(n);
-            if kind == Kind::Fluid {
+            if kind == Kind::Fluid && model.solver.density == Density::Summation {
                 chunks.par_iter_mut().zip(chunks_mut!(p.density, ..n)).enumerate().for_each(|(c, (chunk, density))| {
                     with_scratch(|scratch| {
                         dispatch!(level, simd => {
@@ -246,16 +278,25 @@ impl Cpu {
     fn boundary(&mut self, model: &Model) {
         let p = &mut self.state.particles;
         let level = self.level;
+        if model.no_slip {
+            self.mirror.resize(p.record.len(), [0.0; 4]);
+        }
         for kind in [Kind::Rigid, Kind::Static] {
             let segment = p.segment(kind);
             let (records, owner, first) = (&p.record, &p.owner, segment.start);
-            chunks_mut!(self.share, segment.clone()).zip(&self.neighbours[kind as usize]).enumerate().for_each(
-                |(c, (share, chunk))| {
-                    dispatch!(level, simd => {
-                        boundary::chunk(simd, model, records, owner, first + c * CHUNK, chunk, share);
-                    });
-                },
-            );
+            let neighbours = &self.neighbours[kind as usize];
+            let work = |c: usize, share: &mut [f32], chunk: &NeighbourChunk, mirror: &mut [[f32; 4]]| {
+                dispatch!(level, simd => {
+                    boundary::chunk(simd, model, records, owner, first + c * CHUNK, chunk, share, mirror);
+                });
+            };
+            let chunks = chunks_mut!(self.share, segment.clone()).zip(neighbours).enumerate();
+            if model.no_slip {
+                let mirror = chunks_mut!(self.mirror, segment.clone());
+                chunks.zip(mirror).for_each(|((c, (share, chunk)), mirror)| work(c, share, chunk, mirror));
+            } else {
+                chunks.for_each(|(c, (share, chunk))| work(c, share, chunk, &mut []));
+            }
             for (record, share) in p.record[segment.clone()].iter_mut().zip(&self.share[segment]) {
                 record.share = *share;
             }
@@ -265,13 +306,14 @@ impl Cpu {
     fn forces(&mut self, model: &Model, advance: Advance) {
         let p = &mut self.state.particles;
         let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
+        let (mirror, dt, fastest) = (&self.mirror[..], advance.dt as f32, self.ledger.speed as f32);
         for kind in Kind::ALL {
             let first = p.first[kind as usize];
             let segment = first..first + p.count[kind as usize];
             let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
-            let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut [[f32; 3]]| {
-                let (first, dt) = (first + c * CHUNK, advance.dt as f32);
-                let input = forces::Input { model, records, owner, first, particle_mass, dt };
+            let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut [[f32; 4]]| {
+                let first = first + c * CHUNK;
+                let input = forces::Input { model, records, mirror, owner, first, particle_mass, dt, fastest };
                 dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry));
             };
             if kind == Kind::Fluid && !p.carry.is_empty() {
@@ -303,6 +345,13 @@ impl Cpu {
             .for_each(|((records, push), before)| {
                 particles::kick(integrator, advance, records, push, before);
             });
+        if !p.rate.is_empty() {
+            let n = p.count[Kind::Fluid as usize];
+            chunks_mut!(p.density, ..n)
+                .zip(p.rate[..n].par_chunks(CHUNK))
+                .zip(p.carry[..n].par_chunks(CHUNK))
+                .for_each(|((density, rate), carry)| particles::correct(advance, density, rate, carry));
+        }
         if advance.drag == 0.0 {
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::kick(body, integrator, advance.dt));
         }

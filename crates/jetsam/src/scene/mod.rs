@@ -113,6 +113,12 @@ pub struct Solver {
     /// How pressure is found.
     #[serde(default)]
     pub pressure: Pressure,
+    /// How density is found (E1).
+    #[serde(default)]
+    pub density: Density,
+    /// `delta` of density diffusion (E1), where density is integrated. 0 turns it off.
+    #[serde(default = "d::density_diffusion")]
+    pub density_diffusion: f64,
     /// Equation of state (E3).
     #[serde(default)]
     pub equation_of_state: EquationOfState,
@@ -140,6 +146,13 @@ pub struct Solver {
     /// XSPH (E6): how much particles are carried with their neighbours. 0 turns it off.
     #[serde(default = "d::xsph")]
     pub xsph: f64,
+    /// Shifting (Sun et al. 2017), as a multiple of theirs: inside a fluid, particles are carried from where they are
+    /// dense to where they are sparse. 0 turns it off.
+    #[serde(default = "d::shifting")]
+    pub shifting: f64,
+    /// Whether fluids slip along walls and bodies as if they had no viscosity there.
+    #[serde(default)]
+    pub walls_slip: bool,
     /// What acts between fluid and rigid bodies.
     #[serde(default)]
     pub coupling: Coupling,
@@ -185,6 +198,18 @@ pub enum Pressure {
     /// Weakly compressible SPH: pressure from density by an equation of state.
     #[default]
     Wcsph,
+}
+
+/// E1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Density {
+    /// Summed anew each step over the neighbours: cannot drift; a free surface looks thin to it.
+    #[default]
+    Summation,
+    /// Integrated from the divergence of the flow, with density diffusion (delta-SPH; Antuono et al. 2012): smooth
+    /// pressures, for gauges and waves.
+    Continuity,
 }
 
 /// E3.
