@@ -1,5 +1,6 @@
 //! What does not change while a world runs: constants derived from the scene.
 
+use crate::integrate::sources::{Drain, Source};
 use crate::interact::cells::Grid;
 use crate::laws::kernel::{Kernel, KernelSet};
 use crate::scene::{Force, Solver};
@@ -30,6 +31,12 @@ pub struct Model {
     pub sound_speed: f64,
     /// Gravity (m/s^2).
     pub gravity: DVec3,
+    /// Sources of fluid (E31).
+    pub sources: Vec<Source>,
+    /// Sinks (E31).
+    pub drains: Vec<Drain>,
+    /// Seed of everything random.
+    pub seed: u64,
     /// Fields besides gravity (E30).
     pub fields: Vec<Force>,
     /// The box particles live in and its cells.
@@ -92,6 +99,8 @@ pub struct FluidModel {
     pub stiffness: f32,
     /// `alpha rho_0 c_0 h` (Pa s), E5.
     pub artificial: f32,
+    /// How long a particle lives (s); infinite unless the scene says.
+    pub lifetime: f64,
     /// `delta h c_0 / stiffness` (m^2/s/Pa), E1.
     pub diffusion: f32,
 }

@@ -97,7 +97,7 @@ impl World {
     /// One step, no longer than `longest` (s).
     pub fn step(&mut self, longest: f64) -> StepReport {
         let (dt, bound) = self.next_dt(longest);
-        let advance = Advance { dt, dt_before: self.dt_before, drag: 0.0 };
+        let advance = Advance { time: self.time, dt, dt_before: self.dt_before, drag: 0.0 };
         for (stage, timer) in Stage::WCSPH.into_iter().zip(&mut self.timers) {
             let start = Instant::now();
             self.backend.run(stage, &self.model, advance);
@@ -158,7 +158,7 @@ impl World {
         let mut time = 0.0;
         while time < end {
             let (dt, _) = self.next_dt(end - time);
-            let advance = Advance { dt, dt_before: self.dt_before, drag };
+            let advance = Advance { time: 0.0, dt, dt_before: self.dt_before, drag };
             for stage in Stage::WCSPH {
                 self.backend.run(stage, &self.model, advance);
             }
@@ -173,7 +173,7 @@ impl World {
             Some((_, n)) => *n += 1,
             None => self.bound_by.push((bound, 1)),
         }
-        self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force);
+        self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force) + ledger.crossed;
         self.momentum.force = ledger.external_force;
         let (at_rest, _) = self.model.largest_dt(0.0, 0.0);
         let trouble = if ledger.nonfinite > 0 || !dt.is_finite() {

@@ -3,6 +3,7 @@
 use super::bodies::NewBody;
 use super::near::Near;
 use crate::error::Result;
+use crate::integrate::sources::Source;
 use crate::interact::cells::Grid;
 use crate::model::{ContactModel, DtBound, Factors, FluidModel, Model};
 use crate::scene::{Coupling, EquationOfState, Scene, Start};
@@ -41,7 +42,8 @@ impl Scene {
         let (mut carved, mut outside) = (0, 0);
         for (index, f) in self.fluid.iter().enumerate() {
             let key = format!("fluid.{index}.shape");
-            let solid = self.solid(&f.shape, &key)?;
+            let Some(shape) = &f.shape else { continue };
+            let solid = self.solid(shape, &key)?;
             warnings.extend(solid.warnings.iter().cloned());
             let before = fluid.len();
             for p in solid.points {
@@ -74,7 +76,8 @@ impl Scene {
             warnings.push(format!("{outside} fluid particles outside the domain were left out"));
         }
 
-        let largest_speed = self.largest_speed(&fluid, bodies, gravity, &grid);
+        let sources = self.sources()?;
+        let largest_speed = self.largest_speed(&fluid, bodies, &sources, gravity, &grid);
         let sound_speed = self.solver.sound_speed.unwrap_or(10.0 * largest_speed);
         self.squeeze(&mut fluid, gravity, sound_speed);
         let fluids: Vec<FluidModel> = self
@@ -87,6 +90,7 @@ impl Scene {
                 viscosity: f.viscosity as f32,
                 stiffness: (sound_speed * sound_speed * f.density) as f32,
                 artificial: (self.solver.artificial_viscosity * f.density * sound_speed * 0.5 * support) as f32,
+                lifetime: f.lifetime.unwrap_or(f64::INFINITY),
                 diffusion: (self.solver.density_diffusion * 0.5 * support / (sound_speed * f.density)) as f32,
             })
             .collect();
@@ -113,6 +117,9 @@ impl Scene {
             largest_speed,
             sound_speed,
             gravity,
+            sources,
+            drains: self.drains()?,
+            seed: self.world.seed,
             fields: self.force.clone(),
             grid,
             contact_diameter: self.solver.contact_diameter * spacing,
@@ -132,7 +139,14 @@ impl Scene {
     }
 
     /// Largest speed the scene can reach (m/s): from depth, drop height and velocities given.
-    fn largest_speed(&self, fluid: &[Drop], bodies: &[NewBody], gravity: DVec3, grid: &Grid) -> f64 {
+    fn largest_speed(
+        &self,
+        fluid: &[Drop],
+        bodies: &[NewBody],
+        sources: &[Source],
+        gravity: DVec3,
+        grid: &Grid,
+    ) -> f64 {
         let g = gravity.length();
         let mut speed: f64 = 0.0;
         if g > 0.0 {
@@ -151,6 +165,11 @@ impl Scene {
             if top.is_finite() {
                 speed = (2.0 * g * (top - floor).max(0.0)).sqrt();
             }
+            for source in sources {
+                let top = source.points.iter().map(|&p| height(p)).fold(f64::NEG_INFINITY, f64::max);
+                let drop = (top - height(corner(false))).max(0.0);
+                speed = speed.max((2.0 * g * drop + source.velocity.length_squared()).sqrt());
+            }
             // bodies fall onto the fluid, or onto the floor where there is none
             let ground = if top.is_finite() { top } else { height(corner(false)) };
             for body in bodies.iter().filter(|b| b.mass.is_finite()) {
@@ -160,6 +179,9 @@ impl Scene {
         }
         for f in &self.fluid {
             speed = speed.max(DVec3::from(f.velocity).length());
+        }
+        for source in sources {
+            speed = speed.max(source.velocity.length());
         }
         for body in bodies {
             let reach = body.offset.iter().map(|o| o.length()).fold(0.0, f64::max);

@@ -4,7 +4,7 @@
 //! are made in their order: the same bits for any number of threads.
 
 use super::Backend;
-use crate::integrate::{Advance, bodies, particles};
+use crate::integrate::{Advance, bodies, particles, sources};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
 use crate::interact::{CHUNK, boundary, density, forces, pressure};
@@ -36,6 +36,9 @@ pub struct Cpu {
     sums: Vec<Ledger>,
     ledger: Ledger,
     static_copies: u32,
+    next_id: u32,
+    /// Force that holds fluid inside hoses to their speed (N).
+    held: DVec3,
 }
 
 /// Arrays that `cells` writes while it reads their twins.
@@ -46,6 +49,7 @@ struct Spare {
     owner: Vec<u32>,
     density: Vec<f32>,
     rate: Vec<[f32; 2]>,
+    born: Vec<f32>,
 }
 
 impl Default for Cpu {
@@ -64,6 +68,8 @@ impl Default for Cpu {
             sums: Vec::new(),
             ledger: Ledger::default(),
             static_copies: 0,
+            next_id: 0,
+            held: DVec3::ZERO,
         }
     }
 }
@@ -81,6 +87,7 @@ impl Backend for Cpu {
             owner: p.owner.clone(),
             density: p.density.clone(),
             rate: p.rate.clone(),
+            born: p.born.clone(),
         };
         self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
         self.share = vec![0.0; state.particles.record.len()];
@@ -88,17 +95,22 @@ impl Backend for Cpu {
         self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
         self.ledger = Ledger::default();
         self.static_copies = 0;
+        self.next_id = p.count[Kind::Fluid as usize] as u32;
         self.state = state;
     }
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
         match stage {
             Stage::Drift => self.drift(model, advance),
-            Stage::Cells => self.sort(&model.grid),
+            Stage::Sources => self.sources(model, advance),
+            Stage::Cells => self.sort(model),
             Stage::Density => self.density(model),
             Stage::Pressure => self.pressure(model),
             Stage::Boundary => self.boundary(model),
-            Stage::Forces => self.forces(model, advance),
+            Stage::Forces => {
+                self.forces(model, advance);
+                self.held = sources::hold(&mut self.state.particles, model);
+            }
             Stage::Bodies => self.bodies(model),
             Stage::Kick => self.kick(model, advance),
             Stage::Ledger => self.tally(model),
@@ -148,8 +160,33 @@ impl Cpu {
         }
     }
 
+    /// Fluid is born and drained (E31). Where the fluid's segment has to grow, bodies' particles move up.
+    fn sources(&mut self, model: &Model, advance: Advance) {
+        self.ledger.crossed = DVec3::ZERO;
+        if advance.drag > 0.0 {
+            return;
+        }
+        let p = &mut self.state.particles;
+        let (before, id) = (p.first, self.next_id);
+        self.ledger.crossed += sources::bear(p, model, advance.time, advance.dt, &mut self.next_id);
+        self.ledger.born += u64::from(self.next_id - id);
+        if p.first != before {
+            let total = p.record.len();
+            self.spare.record.resize(total, Record::default());
+            self.spare.id.resize(total, 0);
+            self.spare.owner.resize(total, 0);
+            self.spare.density.resize(p.density.len(), 1.0);
+            self.spare.rate.resize(p.rate.len(), [0.0; 2]);
+            self.spare.born.resize(p.born.len(), 0.0);
+            self.share.resize(total, 0.0);
+            self.static_copies = 0;
+        }
+        sources::drain(p, model, advance.time + advance.dt);
+    }
+
     /// Sorts every kind. Fluids change places for good; particles of bodies are copied from their slots.
-    fn sort(&mut self, grid: &Grid) {
+    fn sort(&mut self, model: &Model) {
+        let grid = &model.grid;
         let p = &mut self.state.particles;
         let from = &mut self.spare;
         let fluid = p.segment(Kind::Fluid);
@@ -158,6 +195,7 @@ impl Cpu {
         self.ledger.left += cells.left as u64;
         self.ledger.lost += cells.lost as u64;
         self.ledger.nonfinite += cells.nonfinite as u64;
+        self.ledger.drained += cells.drained as u64;
         std::mem::swap(&mut p.record, &mut from.record);
         std::mem::swap(&mut p.id, &mut from.id);
         std::mem::swap(&mut p.owner, &mut from.owner);
@@ -176,6 +214,18 @@ impl Cpu {
                     owner[k] = from.owner[place];
                 }
             });
+        for k in living..n {
+            let momentum = model.fluids[p.owner[k] as usize].mass * glam::Vec3::from(p.record[k].v);
+            if momentum.is_finite() {
+                self.ledger.crossed -= momentum.as_dvec3();
+            }
+        }
+        if !p.born.is_empty() {
+            std::mem::swap(&mut p.born, &mut from.born);
+            chunks_mut!(p.born, ..n).zip(cells.order[..n].par_chunks(CHUNK)).for_each(|(born, order)| {
+                born.iter_mut().zip(order).for_each(|(b, place)| *b = from.born[place.load(Relaxed) as usize]);
+            });
+        }
         if !p.rate.is_empty() {
             std::mem::swap(&mut p.density, &mut from.density);
             std::mem::swap(&mut p.rate, &mut from.rate);
@@ -377,6 +427,10 @@ impl Cpu {
         });
         let mut total = Ledger {
             left: self.ledger.left,
+            born: self.ledger.born,
+            drained: self.ledger.drained,
+            crossed: self.ledger.crossed,
+            external_force: self.held,
             lost: self.ledger.lost,
             nonfinite: self.ledger.nonfinite,
             fluid: n,

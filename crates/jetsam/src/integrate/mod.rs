@@ -5,10 +5,13 @@
 
 pub mod bodies;
 pub mod particles;
+pub mod sources;
 
 /// How a step advances time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Advance {
+    /// Time at the beginning of the step (s).
+    pub time: f64,
     /// Length of the step (s).
     pub dt: f64,
     /// Length of the step before (s); 0 at the beginning.

@@ -38,6 +38,9 @@ pub struct Grid {
 const LEFT: u32 = 1;
 const LOST: u32 = 2;
 const NONFINITE: u32 = 3;
+const OUT: u32 = 4;
+/// The first coordinate of a fluid particle that a sink has taken.
+pub const DRAINED: f32 = f32::MAX;
 
 impl Grid {
     /// Cells for a domain. `wall` is how deep solid walls reach outside the domain (m).
@@ -112,6 +115,9 @@ impl Grid {
         if !x.iter().all(|c| c.is_finite()) {
             return NONFINITE;
         }
+        if x[0] == DRAINED {
+            return OUT;
+        }
         let mut gone = 0;
         for a in 0..3 {
             if x[a] < self.lower[a] || x[a] > self.upper[a] {
@@ -174,6 +180,8 @@ pub struct Cells {
     pub lost: usize,
     /// Particles whose position was not finite, at this sort.
     pub nonfinite: usize,
+    /// Particles that a sink has taken, at this sort.
+    pub drained: usize,
     keys: Vec<u32>,
     counts: Vec<Vec<u32>>,
 }
@@ -191,7 +199,7 @@ impl Cells {
             })
             .reduce(|| Window::EMPTY, Window::union);
         let (window, cells) = (self.window, self.window.len());
-        let bins = cells + NONFINITE as usize;
+        let bins = cells + OUT as usize;
         self.start.resize(bins + 1, 0);
         self.keys.resize(n, 0);
         if self.order.len() < n {
@@ -242,7 +250,8 @@ impl Cells {
         self.left = (self.start[cells + 1] - self.start[cells]) as usize;
         self.lost = (self.start[cells + 2] - self.start[cells + 1]) as usize;
         self.nonfinite = (self.start[cells + 3] - self.start[cells + 2]) as usize;
-        n - self.left - self.lost - self.nonfinite
+        self.drained = (self.start[cells + 4] - self.start[cells + 3]) as usize;
+        n - self.left - self.lost - self.nonfinite - self.drained
     }
 }
 

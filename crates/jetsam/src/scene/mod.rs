@@ -4,9 +4,11 @@
 //! remedy. Numbers have their unit, default and range in [`crate::params`]. Lengths are in metres, z points up.
 
 pub mod builtin;
+mod emitter;
 mod load;
 pub mod solid;
 
+pub use emitter::{Emitter, Outlet, Sink};
 pub use load::{Source, schema};
 
 use crate::laws::kernel::KernelSet;
@@ -46,6 +48,12 @@ pub struct Scene {
     /// Bodies that do not move: obstacles, terrain.
     #[serde(default, rename = "static", skip_serializing_if = "Vec::is_empty")]
     pub statics: Vec<Static>,
+    /// Sources of fluid.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub emitter: Vec<Emitter>,
+    /// Places where fluid vanishes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sink: Vec<Sink>,
     /// Fields that pull on everything.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub force: Vec<Force>,
@@ -319,8 +327,9 @@ pub struct Fluid {
     /// Name; `fluid` when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Where it stands at the beginning.
-    pub shape: Shape,
+    /// Where it stands at the beginning; absent for a fluid that only comes from emitters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Shape>,
     /// Rest density `rho_0`.
     #[serde(default = "d::fluid_density")]
     pub density: f64,
@@ -333,6 +342,9 @@ pub struct Fluid {
     /// How the particles stand at the beginning.
     #[serde(default)]
     pub start: Start,
+    /// How long a particle lives; for ever when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lifetime: Option<f64>,
 }
 
 /// How a fluid's particles stand at the beginning.
@@ -468,6 +480,17 @@ pub enum Shape {
         radius: f64,
         /// Length of the axis (m).
         height: f64,
+    },
+    /// A ring: the torus about `center` whose tube of radius `tube` runs at distance `radius` from the axis. 3D scenes only.
+    Torus {
+        /// Centre (m).
+        center: [f64; 3],
+        /// Direction of the axis.
+        axis: [f64; 3],
+        /// Radius of the ring (m).
+        radius: f64,
+        /// Radius of the tube (m).
+        tube: f64,
     },
     /// A triangle mesh: OBJ, STL, PLY, glTF or GLB. 3D scenes only.
     Mesh {
