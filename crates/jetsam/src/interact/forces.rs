@@ -1,8 +1,9 @@
-//! Stage `forces`: every law of pairs, evaluated from both ends of each pair (E4-E6, E10-E12, E16, E17, E30).
+//! Stage `forces`: every law of pairs, evaluated from both ends of each pair (E4-E8, E10-E12, E16, E17, E30).
 //!
 //! In: neighbour runs, records with pressure shares. Out: `push`, an acceleration (m/s^2) for fluids and a force
 //! (N) for the particles of bodies; `carry` for XSPH, shifting and the rate of density. Sums over SPH pairs are in [`super::pairs`], contacts here.
 
+use super::gradients::confinement;
 use super::lanes::LANES;
 use super::neighbours::{NeighbourChunk, Runs};
 use super::pairs::{Ends, Pairs, Terms, wrap};
@@ -22,6 +23,8 @@ pub struct Input<'a> {
     pub records: &'a [Record],
     /// Velocities that bodies' particles show to viscosity (m/s); empty where they show their own.
     pub mirror: &'a [[f32; 4]],
+    /// Colour gradients and vorticities of fluids; empty where they are not asked for.
+    pub gradient: &'a [[f32; 4]],
     /// Owners of all particles.
     pub owner: &'a [u32],
     /// First index of the chunk.
@@ -43,6 +46,7 @@ pub fn chunk<S: Simd>(
     chunk: &NeighbourChunk,
     push: &mut [[f32; 3]],
     carry: &mut [[f32; 4]],
+    vorticity: &mut [[f32; 3]],
 ) {
     for (k, runs) in chunk.runs.iter().enumerate() {
         let i = input.first + k;
@@ -50,7 +54,12 @@ pub fn chunk<S: Simd>(
             push[k] = on_body(simd, &input, kind, chunk, runs, i).to_array();
             continue;
         }
-        let (pairs, total) = on_fluid(simd, &input, chunk, runs, i);
+        let (pairs, mut total) = on_fluid(simd, &input, chunk, runs, i);
+        if input.model.solver.vorticity > 0.0 {
+            let confined = confinement(input.model, pairs.growth(simd), Vec3::from(vorticity[k]));
+            total += confined;
+            vorticity[k] = confined.to_array();
+        }
         push[k] = total.to_array();
         if let Some(carry) = carry.get_mut(k) {
             let [x, y, z] = pairs.carry(simd, input.fastest).to_array();
@@ -72,9 +81,15 @@ fn on_fluid<'a, S: Simd>(
     let own = &input.records[i];
     let owner = input.owner[i];
     let me = &model.fluids[owner as usize];
-    let mut pairs = Pairs::new(model, input.records, input.mirror, i, Some(owner));
+    let mut pairs = Pairs::new(input, i, Some(owner));
     let run = |kind| chunk.list[runs.padded(kind)].as_chunks::<LANES>().0;
-    let mut terms = Terms { mu_sum: [2.0 * me.viscosity; LANES], eta: [me.artificial; LANES], same: [1.0; LANES] };
+    let mut terms = Terms {
+        mu_sum: [2.0 * me.viscosity; LANES],
+        eta: [me.artificial; LANES],
+        same: [1.0; LANES],
+        cohesion: me.cohesion,
+        curvature: me.curvature,
+    };
     for list in run(Kind::Fluid) {
         if model.fluids.len() > 1 {
             for l in 0..LANES {
@@ -89,7 +104,7 @@ fn on_fluid<'a, S: Simd>(
     }
     // walls: the fluid's own viscosity acts (unless they are free of it), the artificial one does not
     let mu = if model.solver.walls_slip { 0.0 } else { 2.0 * me.viscosity };
-    let terms = Terms { mu_sum: [mu; LANES], eta: [0.0; LANES], same: [0.0; LANES] };
+    let terms = Terms { mu_sum: [mu; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
     for list in run(Kind::Static) {
         pairs.add(simd, list, Ends::OnFluid, &terms);
     }
@@ -117,8 +132,9 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, 
     let owner = input.owner[i];
     let mut force = Vec3::ZERO;
     if kind == Kind::Static || model.solver.coupling == Coupling::Pressure {
-        let mut pairs = Pairs::new(model, input.records, input.mirror, i, None);
-        let mut terms = Terms { mu_sum: [0.0; LANES], eta: [0.0; LANES], same: [0.0; LANES] };
+        let mut pairs = Pairs::new(input, i, None);
+        let mut terms =
+            Terms { mu_sum: [0.0; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
         for list in chunk.list[runs.padded(Kind::Fluid)].as_chunks::<LANES>().0 {
             if !model.solver.walls_slip {
                 for l in 0..LANES {

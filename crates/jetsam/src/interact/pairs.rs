@@ -1,9 +1,10 @@
 //! Sums over the SPH pairs of one particle, sixteen neighbours at a time: E4, E5, and where they are asked for the
-//! rate of density (E1), XSPH (E6) and shifting.
+//! rate of density (E1), XSPH (E6), surface tension (E7), the growth of vorticity (E8) and shifting.
 //!
 //! In: a particle, lists of neighbours, records. Out: force, rate, velocity it is carried by. Called by [`super::forces`].
 
 use super::density::{each_lane, weights};
+use super::forces::Input;
 use super::lanes::{LANES, Lanes, gather, sum};
 use crate::laws::{fluid, kernel::Kernel};
 use crate::model::Model;
@@ -73,6 +74,10 @@ pub struct Terms {
     pub eta: Lanes,
     /// 1 where both are of one fluid, else 0.
     pub same: Lanes,
+    /// Strength of cohesion (N/m^(2d)); 0 between fluids and towards bodies.
+    pub cohesion: f32,
+    /// Strength of the curvature term, alike.
+    pub curvature: f32,
 }
 
 /// The sums of one particle.
@@ -80,6 +85,7 @@ pub struct Pairs<'a> {
     model: &'a Model,
     records: &'a [Record],
     mirror: &'a [[f32; 4]],
+    gradient: &'a [[f32; 4]],
     i: u32,
     own: &'a Record,
     kernel: Kernel,
@@ -95,6 +101,7 @@ pub struct Pairs<'a> {
     carry: [Lanes; 3],
     drive: [Lanes; 3],
     full: Lanes,
+    growth: [Lanes; 3],
 }
 
 /// Constants of density diffusion for the fluid of one particle.
@@ -106,10 +113,10 @@ struct Diffusion {
 }
 
 impl<'a> Pairs<'a> {
-    /// Sums for particle `i`, of fluid `fluid` if it is fluid. `mirror` holds the velocities that bodies' particles show to
-    /// viscosity, and is empty where they show their own.
+    /// Sums for particle `i`, of fluid `fluid` if it is fluid.
     #[inline(always)]
-    pub fn new(model: &'a Model, records: &'a [Record], mirror: &'a [[f32; 4]], i: usize, fluid: Option<u32>) -> Self {
+    pub fn new(input: &Input<'a>, i: usize, fluid: Option<u32>) -> Self {
+        let Input { model, records, mirror, gradient, .. } = *input;
         let solver = &model.solver;
         let continuity = fluid.filter(|_| solver.density == Density::Continuity).map(|f| {
             let f = &model.fluids[f as usize];
@@ -119,6 +126,7 @@ impl<'a> Pairs<'a> {
             model,
             records,
             mirror,
+            gradient,
             i: i as u32,
             own: &records[i],
             kernel: model.kernel.force(),
@@ -134,6 +142,7 @@ impl<'a> Pairs<'a> {
             carry: [[0.0; LANES]; 3],
             drive: [[0.0; LANES]; 3],
             full: [0.0; LANES],
+            growth: [[0.0; LANES]; 3],
         }
     }
 
@@ -184,6 +193,17 @@ impl<'a> Pairs<'a> {
         if let Some(diffusion) = self.continuity {
             self.add_rate(ends, &other.volume, &other.share, &d, &v_dot_d, &g, terms, diffusion);
         }
+        if ends == Ends::Fluids && terms.cohesion + terms.curvature > 0.0 {
+            self.add_tension(list, terms, &s, &r_sq, &mut along_d);
+        }
+        if ends == Ends::Fluids && self.model.solver.vorticity > 0.0 {
+            for l in 0..LANES {
+                let slope = -g[l] * other.volume[l] * self.gradient[list[l] as usize][3];
+                for a in 0..3 {
+                    self.growth[a][l] += slope * d[a][l];
+                }
+            }
+        }
         if self.xsph && ends == Ends::Fluids || self.shift {
             self.add_carry(list, ends, &other.volume, &d, &v, &r_sq, &g);
         }
@@ -223,6 +243,26 @@ impl<'a> Pairs<'a> {
             let rate = rate * terms.same[l];
             self.rate[l] +=
                 fluid::density_diffusion(volume[l], self.own.share, share[l], weight, rate, stiffness, g[l]);
+        }
+    }
+
+    /// E7: cohesion into `along_d`, curvature into the force.
+    #[inline(always)]
+    fn add_tension(&mut self, list: &[u32; LANES], terms: &Terms, s: &Lanes, r_sq: &Lanes, along_d: &mut Lanes) {
+        let volumes = self.own.volume * self.own.volume; // of one fluid, all alike
+        for l in 0..LANES {
+            along_d[l] += fluid::cohesion(volumes, terms.cohesion * terms.same[l], s[l], r_sq[l].sqrt());
+        }
+        if terms.curvature == 0.0 {
+            return;
+        }
+        let own = self.gradient[self.i as usize];
+        for l in 0..LANES {
+            let factor = fluid::curvature(volumes, terms.curvature * terms.same[l]);
+            let other = self.gradient[list[l] as usize];
+            for a in 0..3 {
+                self.force[a][l] += factor * (other[a] - own[a]);
+            }
         }
     }
 
@@ -284,6 +324,12 @@ impl<'a> Pairs<'a> {
             }
         }
         v
+    }
+
+    /// Where vorticity grows.
+    #[inline(always)]
+    pub fn growth<S: Simd>(&self, simd: S) -> Vec3 {
+        Vec3::new(sum(simd, &self.growth[0]), sum(simd, &self.growth[1]), sum(simd, &self.growth[2]))
     }
 
     /// Sum of the forces (N).
