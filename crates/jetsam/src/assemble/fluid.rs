@@ -46,11 +46,7 @@ impl Scene {
                 } else if carver.has(p, None) {
                     carved += 1;
                 } else {
-                    let mut v = DVec3::from(f.velocity);
-                    if self.world.dimensions == 2 {
-                        v.y = 0.0;
-                    }
-                    fluid.push(Drop { x: p, v, fluid: index as u32 });
+                    fluid.push(Drop { x: p, v: DVec3::ZERO, fluid: index as u32 });
                 }
             }
             if fluid.len() == before {
@@ -68,9 +64,14 @@ impl Scene {
             warnings.push(format!("{outside} fluid particles outside the domain were left out"));
         }
 
+        let starts = self.starts()?;
+        starts.set_velocities(self, &mut fluid)?;
         let largest_speed = self.largest_speed(&fluid, bodies, gravity, &grid);
         let sound_speed = self.solver.sound_speed.unwrap_or(10.0 * largest_speed);
         self.squeeze(&mut fluid, gravity, sound_speed);
+        if starts.displace(self, &mut fluid, &grid)? {
+            starts.set_velocities(self, &mut fluid)?;
+        }
         let fluids: Vec<FluidModel> = self
             .fluid
             .iter()
@@ -149,9 +150,7 @@ impl Scene {
                 speed = speed.max((2.0 * g * drop + body.v.length_squared()).sqrt());
             }
         }
-        for f in &self.fluid {
-            speed = speed.max(DVec3::from(f.velocity).length());
-        }
+        speed = fluid.iter().map(|f| f.v.length()).fold(speed, f64::max);
         for body in bodies {
             let reach = body.offset.iter().map(|o| o.length()).fold(0.0, f64::max);
             speed = speed.max(body.v.length() + body.spin.length() * reach * f64::from(body.mass.is_finite() as u8));

@@ -8,6 +8,7 @@ mod bodies;
 mod fluid;
 mod memory;
 mod near;
+mod start;
 
 use crate::error::Result;
 use crate::interact::cells::Grid;
