@@ -305,7 +305,7 @@ pub(super) fn check_keys(scene: &Scene, index: usize, p: &Probe) -> Result<()> {
         let message = "only a quaternion has a component w";
         return Err(scene.error(&format!("{path}.component"), message, "give x, y, z or magnitude"));
     }
-    let axis = matches!(p.of, Of::Extent | Of::Inertia | Of::ParticleInertia | Of::Quaternion);
+    let axis = matches!(p.of, Of::Extent | Of::Inertia | Of::ParticleInertia);
     if axis && p.component == Some(Component::Magnitude) {
         return Err(scene.error(&format!("{path}.component"), "an axis is needed", "give x, y or z"));
     }

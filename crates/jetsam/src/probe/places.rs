@@ -11,7 +11,7 @@ use glam::DVec3;
 /// A point counts as dry where the kernel finds less than this fraction of a full support.
 const DRY: f64 = 0.05;
 
-/// Sums over the particles around a point, each weighted by `V W`.
+/// Sums over the particles around a point, each weighted by `V W`; the kernel is not calibrated: a mean over places is exact.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Around {
     /// Of fluid: the fraction of the kernel that is filled.
@@ -47,7 +47,6 @@ pub(super) fn around(world: &World, subject: Subject, points: &[DVec3], solids: 
     let model = world.model();
     let p = &world.state().particles;
     let (kernel, support, dimensions) = (model.kernel.density(), model.support, model.dimensions);
-    let calibration = kernel.lattice_sum(model.solver.support, dimensions);
     let (min, max) = points.iter().fold((DVec3::MAX, DVec3::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
     let (middle, reach) = (0.5 * (min + max), 0.5 * (max - min) + support);
     let mut all = vec![Around::default(); points.len()];
@@ -65,7 +64,7 @@ pub(super) fn around(world: &World, subject: Subject, points: &[DVec3], solids: 
             }
             for (point, sum) in points.iter().zip(&mut all) {
                 let d = way(world, *point, x);
-                let weight = f64::from(r.volume) * kernel.value(d.length(), support, dimensions) / calibration;
+                let weight = f64::from(r.volume) * kernel.value(d.length(), support, dimensions);
                 if weight <= 0.0 {
                     continue;
                 }
