@@ -46,6 +46,7 @@ pub fn check(args: &args::Check) -> miette::Result<Outcome> {
     let mut scene = args.input.open()?;
     scene.solver.settle = 0.0;
     let world = World::from_scene(&scene).map_err(|e| *e)?;
+    jetsam::validate::check_scene(&scene, &world).map_err(|e| *e)?;
     let findings = find(&args.input.scene, &scene, &world);
     if args.json {
         print_json(&findings);

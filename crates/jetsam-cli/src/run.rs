@@ -28,7 +28,8 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     outputs.write(&world, &recorder.frame(&world, Duration::ZERO))?;
     for frame in 1..=times.count {
         let start = Instant::now();
-        world.advance(times.at(frame), |_, step| {
+        world.advance(times.at(frame), |world, step| {
+            outputs.step(world);
             trouble = step.trouble;
             trouble.is_none()
         });

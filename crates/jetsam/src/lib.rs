@@ -38,6 +38,7 @@
 pub mod assemble;
 pub mod backend;
 pub mod error;
+pub mod formula;
 pub mod gpu;
 pub mod integrate;
 pub mod interact;
@@ -46,11 +47,13 @@ pub mod ledger;
 pub mod mesh;
 pub mod model;
 pub mod params;
+pub mod probe;
 pub mod random;
 pub mod report;
 pub mod scene;
 pub mod stage;
 pub mod state;
+pub mod validate;
 pub mod voxelize;
 pub mod world;
 

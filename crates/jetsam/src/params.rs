@@ -76,6 +76,7 @@ params! {
     emitter_period: "emitter.outlet.burst.period", "s", _, 1e-6, 1e6;
     sink_start: "sink.start", "s", 0.0, 0.0, 1e6;
     sink_stop: "sink.stop", "s", _, 0.0, 1e6;
+    jitter: "fluid.jitter", "dx", 0.0, 0.0, 0.5;
     rigid_density: "rigid.density", "kg/m^3", _, 1e-6, 1e6;
     rigid_mass: "rigid.mass", "kg", _, 1e-12, 1e12;
     rigid_velocity: "rigid.velocity", "m/s", _, -1e5, 1e5;
@@ -83,6 +84,13 @@ params! {
     rigid_restitution: "rigid.restitution", "1", 0.3, 0.001, 1.0;
     rigid_stiffness: "rigid.stiffness", "N/m", _, 1e-9, 1e15;
     rigid_damping: "rigid.damping", "N s/m", _, 0.0, 1e12;
+    points: "probe.points", "1", 50.0, 1.0, 10000.0;
+    percentile: "probe.percentile", "%", 100.0, 50.0, 100.0;
+    interval: "probe.interval", "s", _, 0.0, 1e6;
+    crest: "expect.nth", "1", 1.0, 1.0, 1e6;
+    columns: "expect.columns", "1", _, 1.0, 100.0;
+    relative: "expect.relative", "1", _, 0.0, 1e6;
+    refinement: "expect.refinement", "1", 2.0, 1.001, 1000.0;
     fov: "camera.fov", "degrees", 35.0, 1.0, 170.0;
 }
 

@@ -134,8 +134,8 @@ impl World {
         if longest == f64::INFINITY {
             return (dt, bound);
         }
-        // whole steps: what is left is cut evenly, so that no sliver of a step remains
-        (longest / (longest / dt).ceil(), bound)
+        // whole steps: what is left is cut evenly, so that no sliver of a step remains, nor one more for a rounding error
+        (longest / (longest / dt * (1.0 - 1e-9)).ceil(), bound)
     }
 
     /// Runs the stages that evaluate forces.

@@ -56,11 +56,7 @@ impl Scene {
                 } else if carver.has(p, None) {
                     carved += 1;
                 } else {
-                    let mut v = DVec3::from(f.velocity);
-                    if self.world.dimensions == 2 {
-                        v.y = 0.0;
-                    }
-                    fluid.push(Drop { x: p, v, fluid: index as u32, density: 1.0 });
+                    fluid.push(Drop { x: p, v: DVec3::ZERO, fluid: index as u32, density: 1.0 });
                 }
             }
             if fluid.len() == before {
@@ -79,9 +75,14 @@ impl Scene {
         }
 
         let sources = self.sources()?;
+        let starts = self.starts()?;
+        starts.set_velocities(self, &mut fluid)?;
         let largest_speed = self.largest_speed(&fluid, bodies, &sources, gravity, &grid);
         let sound_speed = self.solver.sound_speed.unwrap_or(10.0 * largest_speed);
         self.squeeze(&mut fluid, gravity, sound_speed);
+        if starts.displace(self, &mut fluid, &grid)? {
+            starts.set_velocities(self, &mut fluid)?;
+        }
         let cohesion = cohesion_moment(support, self.world.dimensions);
         let curvature = curvature_moment(self.solver.kernel.force(), support, self.world.dimensions);
         let fluids: Vec<FluidModel> = self
@@ -183,8 +184,8 @@ impl Scene {
                 speed = speed.max((2.0 * g * drop + body.v.length_squared()).sqrt());
             }
         }
+        speed = fluid.iter().map(|f| f.v.length()).fold(speed, f64::max);
         for f in &self.fluid {
-            speed = speed.max(DVec3::from(f.velocity).length());
             // cohesion squeezes a fluid: the speed that its pressure would drive it at
             let (support, d) = (self.solver.support * self.resolution.spacing, self.world.dimensions);
             let cohesion = (1.0 - self.solver.curvature) * f.surface_tension / cohesion_moment(support, d);

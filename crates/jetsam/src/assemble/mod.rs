@@ -9,6 +9,7 @@ mod fluid;
 mod memory;
 mod near;
 mod sources;
+mod start;
 
 use crate::error::Result;
 use crate::interact::cells::Grid;

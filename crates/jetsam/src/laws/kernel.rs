@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// One smoothing function.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Kernel {
     /// Cubic spline (Monaghan 1992), `H = 2 h`.
     Cubic,

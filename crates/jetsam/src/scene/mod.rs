@@ -5,16 +5,22 @@
 
 pub mod builtin;
 mod emitter;
+mod expect;
 mod load;
+mod probe;
 pub mod solid;
 
+pub use crate::formula::Formula;
 pub use emitter::{Emitter, Outlet, Sink};
+pub use expect::{By, Compare, Expect, Take, Validation, Variant};
 pub use load::{Source, schema};
+pub use probe::{Component, End, Line, Norm, Of, Probe, Space};
 
 use crate::laws::kernel::KernelSet;
 use crate::params::default as d;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A whole scene.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -57,6 +63,21 @@ pub struct Scene {
     /// Fields that pull on everything.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub force: Vec<Force>,
+    /// Named numbers, or formulas of each other, for use in formulas.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub constants: BTreeMap<String, Formula>,
+    /// What is measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub probe: Vec<Probe>,
+    /// What should come out: `jetsam validate` judges it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub expect: Vec<Expect>,
+    /// Runs with other values, in place of one run as the scene stands.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub variant: Vec<Variant>,
+    /// What kind of case the scene is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Validation>,
     /// The text this scene was read from, for error messages.
     #[serde(skip)]
     pub source: Source,
@@ -346,15 +367,25 @@ pub struct Fluid {
     /// Surface tension against the air (E7). 0 turns it off.
     #[serde(default = "d::fluid_surface_tension")]
     pub surface_tension: f64,
-    /// Velocity at the beginning.
-    #[serde(default)]
-    pub velocity: [f64; 3],
+    /// Velocity at the beginning: three numbers, or formulas of x, y, z (m).
+    #[serde(default = "at_rest")]
+    pub velocity: [Formula; 3],
     /// How the particles stand at the beginning.
     #[serde(default)]
     pub start: Start,
+    /// How far each particle is moved at random from there, at most, along each axis.
+    #[serde(default = "d::jitter")]
+    pub jitter: f64,
+    /// How far particles are moved from there (m): three formulas of x, y, z, as for the surface of a standing wave.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displace: Option<[Formula; 3]>,
     /// How long a particle lives; for ever when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lifetime: Option<f64>,
+}
+
+fn at_rest() -> [Formula; 3] {
+    [0.0; 3].map(Formula::Number)
 }
 
 /// How a fluid's particles stand at the beginning.
