@@ -18,6 +18,8 @@ pub enum Stage {
     Boundary,
     /// Forces on every particle (E4-E6, E10-E12, E16, E30).
     Forces,
+    /// Agents of flocks move and decide; what they exert on fluids and bodies (E22-E28).
+    Agents,
     /// Force and torque summed per body (E18).
     Bodies,
     /// The second half of the kick.
@@ -28,13 +30,14 @@ pub enum Stage {
 
 impl Stage {
     /// The order of a step of weakly compressible SPH.
-    pub const WCSPH: [Stage; 9] = [
+    pub const WCSPH: [Stage; 10] = [
         Stage::Drift,
         Stage::Cells,
         Stage::Density,
         Stage::Pressure,
         Stage::Boundary,
         Stage::Forces,
+        Stage::Agents,
         Stage::Bodies,
         Stage::Kick,
         Stage::Ledger,
@@ -49,6 +52,7 @@ impl Stage {
             Stage::Pressure => "pressure",
             Stage::Boundary => "boundary",
             Stage::Forces => "forces",
+            Stage::Agents => "agents",
             Stage::Bodies => "bodies",
             Stage::Kick => "kick",
             Stage::Ledger => "ledger",

@@ -4,6 +4,7 @@
 //! are made in their order: the same bits for any number of threads.
 
 use super::Backend;
+use crate::flock::{Crowd, Surroundings};
 use crate::integrate::{Advance, bodies, particles};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
@@ -11,7 +12,7 @@ use crate::interact::{CHUNK, boundary, density, forces, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
 use crate::stage::Stage;
-use crate::state::{Kind, Record, State};
+use crate::state::{Body, Kind, Record, State};
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -33,6 +34,9 @@ pub struct Cpu {
     sums: Vec<Ledger>,
     ledger: Ledger,
     static_copies: u32,
+    crowd: Crowd,
+    /// Radius of each body about its centre of mass (m).
+    body_radius: Vec<f32>,
 }
 
 /// Arrays that `cells` writes while it reads their twins.
@@ -58,6 +62,8 @@ impl Default for Cpu {
             sums: Vec::new(),
             ledger: Ledger::default(),
             static_copies: 0,
+            crowd: Crowd::default(),
+            body_radius: Vec::new(),
         }
     }
 }
@@ -76,6 +82,8 @@ impl Backend for Cpu {
         self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
         self.ledger = Ledger::default();
         self.static_copies = 0;
+        let far = |b: &Body| state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max) as f32;
+        self.body_radius = state.bodies.body.iter().map(far).collect();
         self.state = state;
     }
 
@@ -87,6 +95,7 @@ impl Backend for Cpu {
             Stage::Pressure => self.pressure(model),
             Stage::Boundary => self.boundary(model),
             Stage::Forces => self.forces(model, advance),
+            Stage::Agents => self.agents(model, advance),
             Stage::Bodies => self.bodies(model),
             Stage::Kick => self.kick(model, advance),
             Stage::Ledger => self.tally(model),
@@ -114,7 +123,7 @@ macro_rules! chunks_mut {
 
 impl Cpu {
     fn drift(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let fluid = p.segment(Kind::Fluid);
         let carry = &p.carry;
         chunks_mut!(p.record, fluid.clone()).zip(p.push[fluid].par_chunks(CHUNK)).enumerate().for_each(
@@ -169,7 +178,7 @@ impl Cpu {
 
     /// Sorts the slots of a kind of body and copies them to their places.
     fn copy_bodies(&mut self, grid: &Grid, kind: Kind) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let slots = match kind {
             Kind::Rigid => 0..b.rigid_slots,
             _ => b.rigid_slots..b.record.len(),
@@ -283,8 +292,16 @@ impl Cpu {
         }
     }
 
+    fn agents(&mut self, model: &Model, advance: Advance) {
+        let State { particles, bodies, agents } = &mut self.state;
+        let cells = [&self.cells[0], &self.cells[1], &self.cells[2]];
+        let world = Surroundings { model, particles, cells, bodies: &bodies.body, radius: &self.body_radius };
+        self.crowd.run(self.level, &world, agents, advance);
+        self.ledger.nonfinite += self.crowd.nonfinite as u64;
+    }
+
     fn bodies(&mut self, model: &Model) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let (place, push) = (&self.place, &p.push);
         let force = |slot: usize| match place[slot].load(Relaxed) {
             GONE => [0.0; 3],
@@ -294,7 +311,7 @@ impl Cpu {
     }
 
     fn kick(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let integrator = model.solver.integrator;
         let fluid = p.segment(Kind::Fluid);
         chunks_mut!(p.record, fluid.clone())
@@ -309,7 +326,7 @@ impl Cpu {
     }
 
     fn tally(&mut self, model: &Model) {
-        let State { particles: p, bodies: b } = &self.state;
+        let State { particles: p, bodies: b, .. } = &self.state;
         let fluid = p.segment(Kind::Fluid);
         let n = fluid.len();
         self.sums.resize_with(n.div_ceil(CHUNK), Ledger::default);

@@ -4,9 +4,11 @@
 //! remedy. Numbers have their unit, default and range in [`crate::params`]. Lengths are in metres, z points up.
 
 pub mod builtin;
+mod flock;
 mod load;
 pub mod solid;
 
+pub use flock::{Flock, FlockModel, Relation};
 pub use load::{Source, schema};
 
 use crate::laws::kernel::KernelSet;
@@ -46,6 +48,9 @@ pub struct Scene {
     /// Bodies that do not move: obstacles, terrain.
     #[serde(default, rename = "static", skip_serializing_if = "Vec::is_empty")]
     pub statics: Vec<Static>,
+    /// Flocks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub flock: Vec<Flock>,
     /// Fields that pull on everything.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub force: Vec<Force>,
