@@ -214,6 +214,11 @@ impl World {
         Order::of(&self.model, &self.state().agents, flock)
     }
 
+    /// Mean number of others within the radius of an agent of the flock number `flock`; of topological neighbours their number.
+    pub fn flock_neighbours(&self, flock: usize) -> f64 {
+        crate::flock::neighbours(&self.model, &self.state().agents, flock)
+    }
+
     /// What the last step left behind.
     pub fn ledger(&self) -> &Ledger {
         self.backend.ledger()

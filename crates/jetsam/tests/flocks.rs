@@ -108,7 +108,7 @@ fn one_alone_flies_straight() {
         w.advance(30.0, |_, _| true);
         let a = agents(&w)[0];
         let expected = Vec3::new(1.0, 2.0, 3.0) + 60.0 * Vec3::new(1.0, 2.0, 2.0) / 3.0;
-        assert!((x(&a) - expected).length() < 2e-4, "{model}: {}", x(&a));
+        assert!((x(&a) - expected).length() < 1e-5 * 60.0, "{model}: {}", x(&a));
     }
 }
 
@@ -157,13 +157,13 @@ fn turning_moving_or_renumbering_a_flock_changes_nothing_else() {
     let reversed = changed(|a| a.state.agents.record.reverse());
     for (k, p) in plain.iter().enumerate() {
         let error = |r: &Record, place: Vec3, velocity: Vec3| (x(r) - place).length().max((v(r) - velocity).length());
-        // to 1e-6 of the coordinates' size, ten metres
+        // to 1e-6 of the largest coordinates, twenty metres
         let e = error(&turned[k], middle + turn * (x(p) - middle), turn * v(p));
-        assert!(e < 1e-5, "turned: {k} is off by {e}");
+        assert!(e < 2e-5, "turned: {k} is off by {e}");
         let e = error(&moved[k], x(p) + by, v(p));
-        assert!(e < 1e-5, "moved: {k} is off by {e}");
+        assert!(e < 2e-5, "moved: {k} is off by {e}");
         let e = error(&reversed[plain.len() - 1 - k], x(p), v(p));
-        assert!(e < 1e-5, "renumbered: {k} is off by {e}");
+        assert!(e < 2e-5, "renumbered: {k} is off by {e}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a run leaves behind: one writer a kind of file, each called once a frame.
 
 mod bodies_csv;
+mod flocks_csv;
 mod particles;
 pub mod pictures;
 pub mod ply;
@@ -33,6 +34,9 @@ impl Outputs {
         let mut all: Vec<Box<dyn Writer>> = vec![Box::new(stats::Stats::create(folder)?)];
         if wants(Save::Csv) {
             all.push(Box::new(bodies_csv::BodiesCsv::create(folder)?));
+            if !world.model().flocks.is_empty() {
+                all.push(Box::new(flocks_csv::FlocksCsv::create(folder)?));
+            }
         }
         if wants(Save::Png) || wants(Save::Mp4) {
             all.push(Box::new(pictures::Pictures::create(folder, wants(Save::Png), wants(Save::Mp4), scene, world)?));

@@ -31,5 +31,5 @@ mod sums;
 
 pub use decide::unit_vector;
 pub use model::{FlockConstants, Limits, Weights, name};
-pub use order::Order;
+pub use order::{Order, neighbours};
 pub use stage::{Crowd, World as Surroundings};

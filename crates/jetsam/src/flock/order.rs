@@ -3,7 +3,7 @@
 use super::model::FlockConstants;
 use super::nearest::{Among, nearest};
 use super::perception::grid_about;
-use crate::interact::cells::Cells;
+use crate::interact::cells::{Cells, Grid};
 use crate::model::Model;
 use crate::state::{Agents, Record};
 use glam::DVec3;
@@ -75,51 +75,84 @@ fn center(model: &Model, records: &[Record]) -> DVec3 {
 
 /// Connected parts: metric agents are linked within their radius, topological ones with their nearest.
 fn fragments(model: &Model, flock: &FlockConstants, records: &[Record]) -> usize {
-    let width = f64::from(flock.radius) * 1.0001;
-    let grid = grid_about(&model.grid, records, model.dimensions, width);
-    let mut cells = Cells::default();
-    let inside = cells.sort(&grid, records, None);
-    let order: Vec<u32> = cells.order[..inside].iter().map(|o| o.load(Relaxed)).collect();
-    let sorted: Vec<Record> = order.iter().map(|&o| records[o as usize]).collect();
+    let near = Within::new(model, flock, records);
+    let inside = near.sorted.len();
     let mut sets = Sets::new(inside);
     let mut found = Vec::new();
-    let radius_sq = flock.radius * flock.radius;
     for i in 0..inside {
         if flock.neighbours > 0 {
-            let among = Among { grid: &grid, flocks: &[(&cells, 0)], records: &sorted, id: &order };
+            let flocks = &[(&near.cells, 0)];
+            let among = Among { grid: &near.grid, flocks, records: &near.sorted, id: &near.order };
             nearest(among, i, flock.neighbours, None, &mut found);
             found.iter().for_each(|n| sets.join(i, n.index));
-            continue;
+        } else {
+            near.each(i, |j| sets.join(i, j));
         }
-        let cell = grid.coordinates(sorted[i].x);
-        for dz in -1..=1 {
-            for dy in -1..=1 {
-                for dx in -1..=1 {
-                    let mut c = [cell[0] + dx, cell[1] + dy, cell[2] + dz];
-                    for a in 0..3 {
-                        if grid.period[a] > 0.0 {
-                            c[a] = c[a].rem_euclid(grid.cells[a]);
-                        }
-                    }
-                    for j in cells.row(c[0], c[0], c[1], c[2]).filter(|&j| j < i) {
+    }
+    sets.count + (records.len() - inside)
+}
+
+/// Mean number of others within the radius of an agent; of topological neighbours, their number.
+pub fn neighbours(model: &Model, agents: &Agents, index: usize) -> f64 {
+    let flock = &model.flocks[index];
+    if flock.neighbours > 0 {
+        return flock.neighbours.min(flock.count - 1) as f64;
+    }
+    let near = Within::new(model, flock, &agents.record[flock.range()]);
+    let mut pairs = 0usize;
+    (0..near.sorted.len()).for_each(|i| near.each(i, |_| pairs += 1));
+    2.0 * pairs as f64 / flock.count as f64
+}
+
+/// Agents of one flock in cells as wide as its radius.
+struct Within {
+    grid: Grid,
+    cells: Cells,
+    order: Vec<u32>,
+    sorted: Vec<Record>,
+    radius_sq: f32,
+}
+
+impl Within {
+    fn new(model: &Model, flock: &FlockConstants, records: &[Record]) -> Self {
+        let grid = grid_about(&model.grid, records, model.dimensions, 1.0001 * f64::from(flock.radius));
+        let mut cells = Cells::default();
+        let inside = cells.sort(&grid, records, None);
+        let order: Vec<u32> = cells.order[..inside].iter().map(|o| o.load(Relaxed)).collect();
+        let sorted = order.iter().map(|&o| records[o as usize]).collect();
+        Self { grid, cells, order, sorted, radius_sq: flock.radius * flock.radius }
+    }
+
+    /// Calls `f(j)` for every agent `j < i` within the radius of agent `i`.
+    fn each(&self, i: usize, mut f: impl FnMut(usize)) {
+        let (grid, own) = (&self.grid, &self.sorted[i]);
+        let cell = grid.coordinates(own.x);
+        let wrapped = |a: usize, c: i32| if grid.period[a] > 0.0 { c.rem_euclid(grid.cells[a]) } else { c };
+        // on a periodic axis of fewer than three cells none is met twice
+        let few = |a: usize| grid.period[a] > 0.0 && grid.cells[a] < 3;
+        let range = |a: usize| if few(a) { 0..=grid.cells[a] - 1 } else { -1..=1 };
+        for z in range(2) {
+            for y in range(1) {
+                for x in range(0) {
+                    let c = [wrapped(0, cell[0] + x), wrapped(1, cell[1] + y), wrapped(2, cell[2] + z)];
+                    for j in self.cells.row(c[0], c[0], c[1], c[2]).filter(|&j| j < i) {
                         let mut r_sq = 0.0;
                         for a in 0..3 {
-                            let mut d = sorted[j].x[a] - sorted[i].x[a];
+                            let mut d = self.sorted[j].x[a] - own.x[a];
                             let period = grid.period[a];
                             if period > 0.0 {
                                 d -= period * (d / period).round();
                             }
                             r_sq += d * d;
                         }
-                        if r_sq < radius_sq {
-                            sets.join(i, j);
+                        if r_sq < self.radius_sq {
+                            f(j);
                         }
                     }
                 }
             }
         }
     }
-    sets.count + (records.len() - inside)
 }
 
 /// Disjoint sets.

@@ -8,7 +8,8 @@ use crate::interact::lanes::{LANES, Lanes, sum};
 use crate::laws::flock;
 use crate::scene::FlockModel;
 use crate::state::Record;
-use fearless_simd::Simd;
+use fearless_simd::f32x16;
+use fearless_simd::prelude::*;
 use glam::Vec3;
 
 /// Sums over neighbours.
@@ -92,7 +93,7 @@ fn add(to: &mut [Lanes; 3], weight: &Lanes, vector: [&Lanes; 3]) {
 pub fn school<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, sums: &mut Sums) {
     let mut wide = Wide::new();
     match rule.model {
-        FlockModel::Reynolds => reynolds(me, rule, tile, unbounded, &mut wide),
+        FlockModel::Reynolds => reynolds(simd, me, rule, tile, unbounded, &mut wide),
         FlockModel::Couzin => couzin(me, rule, tile, unbounded, &mut wide),
         FlockModel::Vicsek => vicsek(me, rule, tile, unbounded, &mut wide),
     }
@@ -111,19 +112,18 @@ fn square(radius: f32, unbounded: bool) -> f32 {
 
 /// E22.
 #[inline(always)]
-fn reynolds(me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+fn reynolds<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
     let near_sq = rule.separation_radius * rule.separation_radius;
+    let (near_limit, zero) = (f32x16::splat(simd, near_sq), f32x16::splat(simd, 0.0));
     let align_sq = square(rule.alignment_radius, unbounded);
     let draw_sq = square(rule.cohesion_radius, unbounded);
     for b in 0..tile.blocks() {
         let block = tile.block(b);
         let (d, r_sq) = apart(me, &block);
         let (mut aligned, mut drawn) = ([0.0; LANES], [0.0; LANES]);
-        let mut near = 0.0f32;
         for l in 0..LANES {
             aligned[l] = flock::within(r_sq[l], align_sq);
             drawn[l] = flock::within(r_sq[l], draw_sq);
-            near += flock::within(r_sq[l], near_sq);
         }
         let mut seen = [1.0; LANES];
         if let Some(bound) = rule.view {
@@ -140,7 +140,8 @@ fn reynolds(me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wi
             wide.drawn[l] += drawn[l];
         }
         // few are near: most vectors are spared the division
-        if near > 0.0 {
+        let wide_r = f32x16::load_array_ref(simd, &r_sq);
+        if (wide_r.simd_lt(near_limit) & wide_r.simd_gt(zero)).any_true() {
             let mut push = [0.0; LANES];
             for l in 0..LANES {
                 let weight = flock::separation(r_sq[l], rule.separation_radius) * flock::within(r_sq[l], near_sq);

@@ -90,7 +90,7 @@ fn moved(v: vec3<f32>, a: vec3<f32>, dt: f32, heading: vec3<f32>, cosine: f32, s
 // E23 (Couzin et al. 2002): direction wanted, from the sums over the zones of repulsion, orientation and attraction.
 fn couzin(repelled: vec3<f32>, oriented: vec3<f32>, attracted: vec3<f32>, heading: vec3<f32>) -> vec3<f32> {
   let near = dot(repelled, repelled);
-  let far = oriented + attracted;
+  let far = unit(oriented) + unit(attracted);
   if (near > 1e-12) { return unit(repelled); }
   if (dot(far, far) > 1e-12) { return unit(far); }
   return heading;
