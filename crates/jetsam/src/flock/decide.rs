@@ -87,7 +87,7 @@ pub fn chunk<S: Simd>(
         for (j, other) in flocks.iter().enumerate() {
             let metric = rule.neighbours == 0 || rule.relations[j] != Relation::School;
             if rule.relations[j] != Relation::Ignore && metric {
-                scratch.tiles[j].pack(view.grid, &view.cells[j], other.first, view.sorted, cell);
+                scratch.tiles[j].pack(simd, view.grid, &view.cells[j], other.first, view.sorted, cell);
             }
         }
         for i in from..to {
@@ -115,14 +115,15 @@ fn perceive<S: Simd>(simd: S, scratch: &mut Scratch, view: View, own: usize, i: 
         }
     }
     if rule.neighbours > 0 {
-        pick_nearest(view, own, i, scratch);
+        pick_nearest(simd, view, own, i, scratch);
         sums::school(simd, me, rule, &scratch.tiles[own], true, &mut total);
     }
     total
 }
 
 /// Packs the topological neighbours of agent `i` (E25) into the tile of its own flock.
-fn pick_nearest(view: View, own: usize, i: usize, scratch: &mut Scratch) {
+#[inline(always)]
+fn pick_nearest<S: Simd>(simd: S, view: View, own: usize, i: usize, scratch: &mut Scratch) {
     let flocks = &view.world.model.flocks;
     let rule = &flocks[own];
     let schools = rule.relations.iter().zip(view.cells).zip(flocks);
@@ -131,7 +132,7 @@ fn pick_nearest(view: View, own: usize, i: usize, scratch: &mut Scratch) {
     let among = Among { grid: view.grid, flocks: &among, records: view.records, id: view.id };
     nearest(among, i, rule.neighbours, rule.view, &mut scratch.nearest);
     let found = scratch.nearest.iter().map(|n| (n.index, n.shift));
-    scratch.tiles[own].pick(view.sorted, found);
+    scratch.tiles[own].pick(simd, view.sorted, found);
 }
 
 #[inline(always)]

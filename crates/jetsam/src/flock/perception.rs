@@ -8,6 +8,8 @@ use crate::interact::cells::{Cells, Grid};
 use crate::interact::lanes::{LANES, padded};
 use crate::state::Record;
 use bytemuck::{Pod, Zeroable};
+use fearless_simd::f32x16;
+use fearless_simd::prelude::*;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -62,7 +64,7 @@ pub fn grid_about(domain: &Grid, records: &[Record], dimensions: u32, width: f64
     grid
 }
 
-/// Positions and velocities of all agents in sorted order, each component by itself.
+/// Positions and velocities of all agents in sorted order, each component by itself, and room for a vector at the end.
 #[derive(Default)]
 pub struct Sorted {
     /// x, y, z, vx, vy, vz (SI).
@@ -73,7 +75,7 @@ impl Sorted {
     /// Takes over records.
     pub fn fill(&mut self, records: &[Record]) {
         for (c, line) in self.lines.iter_mut().enumerate() {
-            line.resize(records.len(), 0.0);
+            line.resize(records.len() + LANES, 0.0);
             line.par_chunks_mut(8 * CHUNK).zip(records.par_chunks(8 * CHUNK)).for_each(|(line, records)| {
                 for (to, r) in line.iter_mut().zip(records) {
                     *to = if c < 3 { r.x[c] } else { r.v[c - 3] };
@@ -126,16 +128,21 @@ impl Tile {
 
     /// Appends the agents `row` of the sorted order, shifted.
     #[inline(always)]
-    fn append(&mut self, sorted: &Sorted, row: Range<usize>, shift: [f32; 3]) {
+    fn append<S: Simd>(&mut self, simd: S, sorted: &Sorted, row: Range<usize>, shift: [f32; 3]) {
         let (at, n) = (self.len, row.len());
-        self.reserve(at + n);
+        if n == 0 {
+            return;
+        }
+        // whole vectors: what is too much is overwritten by what comes next
+        self.reserve(at + n + LANES);
         self.len += n;
         for c in 0..6 {
-            let shift = if c < 3 { shift[c] } else { 0.0 };
-            let to = &mut bytemuck::cast_slice_mut::<Line, f32>(&mut self.lines[c])[at..at + n];
-            let from = &sorted.lines[c][row.clone()];
-            for k in 0..n {
-                to[k] = from[k] + shift;
+            let shift = f32x16::splat(simd, if c < 3 { shift[c] } else { 0.0 });
+            let to = &mut bytemuck::cast_slice_mut::<Line, f32>(&mut self.lines[c])[at..];
+            let from = &sorted.lines[c][row.start..];
+            for k in (0..n).step_by(LANES) {
+                let v = f32x16::from_slice(simd, &from[k..k + LANES]);
+                (v + shift).store_slice(&mut to[k..k + LANES]);
             }
         }
     }
@@ -149,17 +156,18 @@ impl Tile {
     }
 
     /// Packs single agents, each with its shift.
-    pub fn pick(&mut self, sorted: &Sorted, agents: impl Iterator<Item = (usize, [f32; 3])>) {
+    #[inline(always)]
+    pub fn pick<S: Simd>(&mut self, simd: S, sorted: &Sorted, agents: impl Iterator<Item = (usize, [f32; 3])>) {
         self.begin();
         for (i, shift) in agents {
-            self.append(sorted, i..i + 1, shift);
+            self.append(simd, sorted, i..i + 1, shift);
         }
         self.end();
     }
 
     /// Packs the agents of a flock (its cells, its first agent) in the 27 cells around `cell`; periodic images are shifted into place.
     #[inline(always)]
-    pub fn pack(&mut self, grid: &Grid, cells: &Cells, first: usize, sorted: &Sorted, cell: [i32; 3]) {
+    pub fn pack<S: Simd>(&mut self, simd: S, grid: &Grid, cells: &Cells, first: usize, sorted: &Sorted, cell: [i32; 3]) {
         self.begin();
         let reach = |a: usize| if grid.cells[a] == 1 && grid.period[a] == 0.0 { 0..=0 } else { -1..=1 };
         let (low, high, last) = (cell[0] - 1, cell[0] + 1, grid.cells[0] - 1);
@@ -169,13 +177,13 @@ impl Tile {
                 let Some((y, shift_y)) = image(grid, 1, cell[1] + dy) else { continue };
                 let place = |r: Range<usize>| first + r.start..first + r.end;
                 let shift = [0.0, shift_y, shift_z];
-                self.append(sorted, place(cells.row(low.max(0), high.min(last), y, z)), shift);
+                self.append(simd, sorted, place(cells.row(low.max(0), high.min(last), y, z)), shift);
                 let period = grid.period[0];
                 if period > 0.0 && low < 0 {
-                    self.append(sorted, place(cells.row(last, last, y, z)), [-period, shift_y, shift_z]);
+                    self.append(simd, sorted, place(cells.row(last, last, y, z)), [-period, shift_y, shift_z]);
                 }
                 if period > 0.0 && high > last {
-                    self.append(sorted, place(cells.row(0, 0, y, z)), [period, shift_y, shift_z]);
+                    self.append(simd, sorted, place(cells.row(0, 0, y, z)), [period, shift_y, shift_z]);
                 }
             }
         }
