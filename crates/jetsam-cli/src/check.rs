@@ -21,6 +21,7 @@ struct Findings {
     static_particles: usize,
     bodies: usize,
     static_bodies: usize,
+    agents: usize,
     neighbours: f64,
     seconds: f64,
     dt: f64,
@@ -80,6 +81,7 @@ fn find(name: &str, scene: &Scene, world: &World) -> Findings {
         static_particles: count[Kind::Static as usize],
         bodies: bodies.len() - static_bodies,
         static_bodies,
+        agents: world.state().agents.record.len(),
         neighbours: ledger.neighbours,
         seconds: scene.run.seconds,
         dt,
@@ -121,6 +123,7 @@ fn describe(f: &Findings) -> String {
         ("scene", format!("{} ({})", f.scene, f.title)),
         ("particles", format!("{} fluid, {} rigid, {} static", f.fluid, f.rigid_particles, f.static_particles)),
         ("bodies", format!("{} rigid, {} static", f.bodies, f.static_bodies)),
+        ("agents", f.agents.to_string()),
         ("spacing", format!("{} m, support {} m, {:.1} neighbours", f.spacing, f.support, f.neighbours)),
         (
             "time step",

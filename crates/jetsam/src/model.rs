@@ -1,5 +1,6 @@
 //! What does not change while a world runs: constants derived from the scene.
 
+use crate::flock::FlockConstants;
 use crate::integrate::sources::{Drain, Source};
 use crate::interact::cells::Grid;
 use crate::laws::kernel::{Kernel, KernelSet};
@@ -24,6 +25,8 @@ pub struct Model {
     pub factors: Factors,
     /// Fluids, in the order of the scene.
     pub fluids: Vec<FluidModel>,
+    /// Flocks, in the order of the scene.
+    pub flocks: Vec<FlockConstants>,
     /// Contact numbers of each body, in the order of [`crate::state::Bodies`].
     pub contacts: Vec<ContactModel>,
     /// Largest speed the scene can reach (m/s), from depth, drop height and velocities.
@@ -184,6 +187,8 @@ pub enum DtBound {
     Viscosity,
     /// A twentieth of a contact.
     Contact,
+    /// A quarter of the smallest radius of a flock, or its next decision.
+    Flock,
     /// The scene's own `dt`.
     Scene,
     /// The end of a frame.
@@ -198,6 +203,7 @@ impl DtBound {
             DtBound::Force => "force",
             DtBound::Viscosity => "viscosity",
             DtBound::Contact => "contact",
+            DtBound::Flock => "flock",
             DtBound::Scene => "scene",
             DtBound::Frame => "frame",
         }
@@ -276,6 +282,22 @@ impl Model {
         let (k, _) = self.contact_pair(a as u32, a as u32);
         let mass = 0.5 / f64::from(c.inverse_mass);
         std::f64::consts::PI * (mass / (f64::from(k) * f64::from(c.shared_by))).sqrt()
+    }
+
+    /// Takes over the flocks and what they ask of the time step: to be smooth, and not to pass a body within a step.
+    pub fn add_flocks(&mut self, flocks: Vec<FlockConstants>) {
+        let meet_bodies = !self.contacts.is_empty();
+        let mut dt = f64::INFINITY;
+        for flock in &flocks {
+            dt = dt.min(flock.largest_dt());
+            if meet_bodies {
+                dt = dt.min(0.5 * self.spacing / f64::from(flock.limits.fastest));
+            }
+        }
+        if dt.is_finite() {
+            self.dt_bounds.push((DtBound::Flock, dt));
+        }
+        self.flocks = flocks;
     }
 
     /// Largest time step allowed now and what bounds it (E29), from the largest speed (m/s) and acceleration (m/s^2).

@@ -91,6 +91,38 @@ params! {
     columns: "expect.columns", "1", _, 1.0, 100.0;
     relative: "expect.relative", "1", _, 0.0, 1e6;
     refinement: "expect.refinement", "1", 2.0, 1.001, 1000.0;
+    flock_count: "flock.count", "1", _, 1.0, 1e8;
+    flock_radius: "flock.radius", "m", _, 1e-9, 1e6;
+    flock_separation_radius: "flock.separation_radius", "m", _, 0.0, 1e6;
+    flock_alignment_radius: "flock.alignment_radius", "m", _, 0.0, 1e6;
+    flock_cohesion_radius: "flock.cohesion_radius", "m", _, 0.0, 1e6;
+    flock_sight: "flock.sight", "m", _, 0.0, 1e6;
+    flock_field_of_view: "flock.field_of_view", "degrees", 360.0, 1.0, 360.0;
+    flock_neighbours: "flock.neighbours", "1", _, 0.0, 64.0;
+    flock_speed: "flock.speed", "m/s", _, 1e-9, 1e5;
+    flock_speed_min: "flock.speed_min", "m/s", _, 0.0, 1e5;
+    flock_speed_max: "flock.speed_max", "m/s", _, 0.0, 1e5;
+    flock_turn: "flock.turn", "degrees/s", _, 0.0, 1e9;
+    flock_acceleration: "flock.acceleration", "m/s^2", _, 0.0, 1e9;
+    flock_separation: "flock.separation", "1", 1.0, 0.0, 1e4;
+    flock_alignment: "flock.alignment", "1", 1.0, 0.0, 1e4;
+    flock_cohesion: "flock.cohesion", "1", 1.0, 0.0, 1e4;
+    flock_cruise: "flock.cruise", "1", 1.0, 0.0, 1e4;
+    flock_wander: "flock.wander", "1", 0.0, 0.0, 1e4;
+    flock_seek: "flock.seek", "1", 1.0, 0.0, 1e4;
+    flock_arrive: "flock.arrive", "m", 0.0, 0.0, 1e6;
+    flock_follow: "flock.follow", "1", 1.0, 0.0, 1e4;
+    flock_follow_distance: "flock.follow_distance", "m", _, 0.0, 1e6;
+    flock_flee: "flock.flee", "1", 4.0, 0.0, 1e4;
+    flock_chase: "flock.chase", "1", 2.0, 0.0, 1e4;
+    flock_avoid: "flock.avoid", "1", 4.0, 0.0, 1e4;
+    flock_look_ahead: "flock.look_ahead", "s", _, 0.0, 1e6;
+    flock_margin: "flock.margin", "m", _, 0.0, 1e6;
+    flock_noise: "flock.noise", "rad", 0.0, 0.0, 100.0;
+    flock_tau: "flock.tau", "s", _, 0.0, 1e6;
+    flock_size: "flock.size", "m", 0.0, 0.0, 1e4;
+    flock_mass: "flock.mass", "kg", _, 1e-12, 1e12;
+    flock_drag: "flock.drag", "1", 0.0, 0.0, 1e4;
     fov: "camera.fov", "degrees", 35.0, 1.0, 170.0;
 }
 

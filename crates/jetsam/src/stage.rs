@@ -22,6 +22,8 @@ pub enum Stage {
     Gradients,
     /// Forces on every particle (E4-E6, E10-E12, E16, E30).
     Forces,
+    /// Agents of flocks move and decide; what they exert on fluids and bodies (E22-E28).
+    Agents,
     /// Force and torque summed per body (E18).
     Bodies,
     /// The second half of the kick.
@@ -32,7 +34,7 @@ pub enum Stage {
 
 impl Stage {
     /// The order of a step of weakly compressible SPH.
-    pub const WCSPH: [Stage; 11] = [
+    pub const WCSPH: [Stage; 12] = [
         Stage::Drift,
         Stage::Sources,
         Stage::Cells,
@@ -41,6 +43,7 @@ impl Stage {
         Stage::Boundary,
         Stage::Gradients,
         Stage::Forces,
+        Stage::Agents,
         Stage::Bodies,
         Stage::Kick,
         Stage::Ledger,
@@ -57,6 +60,7 @@ impl Stage {
             Stage::Boundary => "boundary",
             Stage::Gradients => "gradients",
             Stage::Forces => "forces",
+            Stage::Agents => "agents",
             Stage::Bodies => "bodies",
             Stage::Kick => "kick",
             Stage::Ledger => "ledger",

@@ -206,6 +206,32 @@ pub struct Bodies {
     pub rigid_slots: usize,
 }
 
+/// Agents of all flocks, flock by flock; inside a flock in the order of cells, ties by id.
+#[derive(Clone, Debug, Default)]
+pub struct Agents {
+    /// Position and velocity; the other two numbers are not used. Written by agents.
+    pub record: Vec<Record>,
+    /// Identity, counted over all flocks from 0. Permuted by agents.
+    pub id: Vec<u32>,
+    /// What was decided: steering (m/s^2) of Reynolds' agents, else the velocity to come (m/s). Written by agents.
+    pub next: Vec<[f32; 3]>,
+    /// Force of fluids and bodies on the agent (N): E27, E28. Written by agents.
+    pub force: Vec<[f32; 3]>,
+    /// Time of each flock. Written by agents.
+    pub clock: Vec<Clock>,
+}
+
+/// Time as a flock counts it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Clock {
+    /// Time since the beginning (s).
+    pub time: f64,
+    /// Time until the next decision (s).
+    pub wait: f64,
+    /// Decisions made.
+    pub decisions: u64,
+}
+
 /// The whole changing state of a world.
 #[derive(Clone, Debug, Default)]
 pub struct State {
@@ -213,4 +239,6 @@ pub struct State {
     pub particles: Particles,
     /// Bodies.
     pub bodies: Bodies,
+    /// Agents of flocks.
+    pub agents: Agents,
 }

@@ -3,6 +3,7 @@
 use crate::assemble::Assembly;
 use crate::backend::{Backend, Cpu};
 use crate::error::Result;
+use crate::flock::Order;
 use crate::integrate::Advance;
 use crate::ledger::Ledger;
 use crate::mesh::Mesh;
@@ -128,14 +129,25 @@ impl World {
     fn next_dt(&self, longest: f64) -> (f64, DtBound) {
         let ledger = self.backend.ledger();
         let (dt, bound) = self.model.largest_dt(ledger.speed, ledger.acceleration);
+        let (longest, end) = self.next_end(longest);
         if dt >= longest {
-            return (longest, DtBound::Frame);
+            return (longest, end);
         }
         if longest == f64::INFINITY {
             return (dt, bound);
         }
         // whole steps: what is left is cut evenly, so that no sliver of a step remains, nor one more for a rounding error
         (longest / (longest / dt * (1.0 - 1e-9)).ceil(), bound)
+    }
+
+    /// Where a step has to end at the latest: at the end of what was asked, or where a flock decides.
+    fn next_end(&self, longest: f64) -> (f64, DtBound) {
+        let clocks = self.state().agents.clock.iter().zip(&self.model.flocks);
+        let waits = clocks.filter(|(_, flock)| flock.tau > 0.0).map(|(clock, _)| clock.wait);
+        match waits.fold(f64::INFINITY, f64::min) {
+            wait if wait < longest => (wait, DtBound::Flock),
+            _ => (longest, DtBound::Frame),
+        }
     }
 
     /// Runs the stages that evaluate forces.
@@ -178,7 +190,7 @@ impl World {
         let (at_rest, _) = self.model.largest_dt(0.0, 0.0);
         let trouble = if ledger.nonfinite > 0 || !dt.is_finite() {
             Some(Trouble::NotFinite)
-        } else if bound != DtBound::Frame && dt < STALLED * at_rest {
+        } else if !matches!(bound, DtBound::Frame | DtBound::Flock) && dt < STALLED * at_rest {
             Some(Trouble::Stalled)
         } else {
             None
@@ -200,6 +212,16 @@ impl World {
     pub fn fluid(&self) -> impl Iterator<Item = &Record> {
         let particles = &self.state().particles;
         particles.record[particles.segment(Kind::Fluid)].iter()
+    }
+
+    /// How ordered the flock number `flock` is.
+    pub fn flock_order(&self, flock: usize) -> Order {
+        Order::of(&self.model, &self.state().agents, flock)
+    }
+
+    /// Mean number of others within the radius of an agent of the flock number `flock`; of topological neighbours their number.
+    pub fn flock_neighbours(&self, flock: usize) -> f64 {
+        crate::flock::neighbours(&self.model, &self.state().agents, flock)
     }
 
     /// What the last step left behind.

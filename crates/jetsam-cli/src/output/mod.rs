@@ -1,6 +1,7 @@
 //! What a run leaves behind: one writer a kind of file, each called once a frame.
 
 mod bodies_csv;
+mod flocks_csv;
 mod particles;
 pub mod pictures;
 pub mod ply;
@@ -38,6 +39,9 @@ impl Outputs {
             all.push(Box::new(bodies_csv::BodiesCsv::create(folder)?));
             if !scene.probe.is_empty() {
                 all.push(Box::new(probes_csv::ProbesCsv::create(folder, scene, world)?));
+            }
+            if !world.model().flocks.is_empty() {
+                all.push(Box::new(flocks_csv::FlocksCsv::create(folder)?));
             }
         }
         if wants(Save::Png) || wants(Save::Mp4) {

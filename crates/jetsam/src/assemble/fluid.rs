@@ -120,6 +120,7 @@ impl Scene {
             kernel: self.solver.kernel,
             factors: Factors::new(self.solver.kernel, self.solver.support, support, self.world.dimensions),
             fluids,
+            flocks: Vec::new(),
             contacts,
             largest_speed,
             sound_speed,

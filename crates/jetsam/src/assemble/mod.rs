@@ -5,6 +5,7 @@
 //! model's warnings.
 
 mod bodies;
+mod flocks;
 mod fluid;
 mod memory;
 mod near;
@@ -64,10 +65,13 @@ impl Scene {
             }
         }
         warn_of_overlap(&bodies[..], spacing, &mut warnings);
+        let flocks = self.flock_constants()?;
+        let agents = self.agents(&flocks, &grid, &self.obstacles(&flocks, &bodies))?;
         let (mut model, fluid) = self.derive(grid, volume, support, &bodies, carver, &mut warnings)?;
+        model.add_flocks(flocks);
         model.warnings = warnings;
         let meshes = bodies.iter().map(|b| b.mesh.clone()).collect();
-        let state = join(fluid, bodies, rigid_count, &model);
+        let state = State { agents, ..join(fluid, bodies, rigid_count, &model) };
         let particles = state.particles.len() as f64;
         check_available(particles * BYTES_PER_PARTICLE).map_err(|(need, have)| {
             let message = format!("{particles} particles need {need:.1} GB of memory, and {have:.1} GB are available");
@@ -91,11 +95,11 @@ impl Scene {
             let message = "a 2D scene lies in the x-z plane, but gravity has a y component";
             return Err(self.error("world.gravity", message, "give gravity = [x, 0, z]"));
         }
-        if self.fluid.is_empty() && self.rigid.is_empty() {
+        if self.fluid.is_empty() && self.rigid.is_empty() && self.flock.is_empty() {
             return Err(self.error(
                 "",
-                "the scene has neither fluid nor rigid bodies",
-                "add a [[fluid]] or a [[rigid]]",
+                "the scene has neither fluid nor rigid bodies nor flocks",
+                "add a [[fluid]], a [[rigid]] or a [[flock]]",
             ));
         }
         let support = self.solver.support * self.resolution.spacing;
@@ -236,5 +240,5 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
         p.owner[i] = drop.fluid;
     }
     p.record[room..].copy_from_slice(&bodies.record);
-    State { particles: p, bodies }
+    State { particles: p, bodies, ..State::default() }
 }

@@ -4,6 +4,7 @@
 //! are made in their order: the same bits for any number of threads.
 
 use super::Backend;
+use crate::flock::{Crowd, Surroundings};
 use crate::integrate::{Advance, bodies, particles, sources};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
@@ -12,7 +13,7 @@ use crate::ledger::Ledger;
 use crate::model::Model;
 use crate::scene::Density;
 use crate::stage::Stage;
-use crate::state::{Kind, Record, State};
+use crate::state::{Body, Kind, Record, State};
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -39,6 +40,9 @@ pub struct Cpu {
     next_id: u32,
     /// Force that holds fluid inside hoses to their speed (N).
     held: DVec3,
+    crowd: Crowd,
+    /// Radius of each body about its centre of mass (m).
+    body_radius: Vec<f32>,
 }
 
 /// Arrays that `cells` writes while it reads their twins.
@@ -70,6 +74,8 @@ impl Default for Cpu {
             static_copies: 0,
             next_id: 0,
             held: DVec3::ZERO,
+            crowd: Crowd::default(),
+            body_radius: Vec::new(),
         }
     }
 }
@@ -96,6 +102,8 @@ impl Backend for Cpu {
         self.ledger = Ledger::default();
         self.static_copies = 0;
         self.next_id = p.count[Kind::Fluid as usize] as u32;
+        let far = |b: &Body| state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max) as f32;
+        self.body_radius = state.bodies.body.iter().map(far).collect();
         self.state = state;
     }
 
@@ -112,6 +120,7 @@ impl Backend for Cpu {
                 self.forces(model, advance);
                 self.held = sources::hold(&mut self.state.particles, model);
             }
+            Stage::Agents => self.agents(model, advance),
             Stage::Bodies => self.bodies(model),
             Stage::Kick => self.kick(model, advance),
             Stage::Ledger => self.tally(model),
@@ -139,7 +148,7 @@ macro_rules! chunks_mut {
 
 impl Cpu {
     fn drift(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let fluid = p.segment(Kind::Fluid);
         let carry = &p.carry;
         chunks_mut!(p.record, fluid.clone()).zip(p.push[fluid].par_chunks(CHUNK)).enumerate().for_each(
@@ -252,7 +261,7 @@ impl Cpu {
 
     /// Sorts the slots of a kind of body and copies them to their places.
     fn copy_bodies(&mut self, grid: &Grid, kind: Kind) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let slots = match kind {
             Kind::Rigid => 0..b.rigid_slots,
             _ => b.rigid_slots..b.record.len(),
@@ -407,8 +416,16 @@ impl Cpu {
         }
     }
 
+    fn agents(&mut self, model: &Model, advance: Advance) {
+        let State { particles, bodies, agents } = &mut self.state;
+        let cells = [&self.cells[0], &self.cells[1], &self.cells[2]];
+        let world = Surroundings { model, particles, cells, bodies: &bodies.body, radius: &self.body_radius };
+        self.crowd.run(self.level, &world, agents, advance);
+        self.ledger.nonfinite += self.crowd.nonfinite as u64;
+    }
+
     fn bodies(&mut self, model: &Model) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let (place, push) = (&self.place, &p.push);
         let force = |slot: usize| match place[slot].load(Relaxed) {
             GONE => [0.0; 3],
@@ -418,7 +435,7 @@ impl Cpu {
     }
 
     fn kick(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let integrator = model.solver.integrator;
         let fluid = p.segment(Kind::Fluid);
         chunks_mut!(p.record, fluid.clone())
@@ -440,7 +457,7 @@ impl Cpu {
     }
 
     fn tally(&mut self, model: &Model) {
-        let State { particles: p, bodies: b } = &self.state;
+        let State { particles: p, bodies: b, .. } = &self.state;
         let fluid = p.segment(Kind::Fluid);
         let n = fluid.len();
         self.sums.resize_with(n.div_ceil(CHUNK), Ledger::default);

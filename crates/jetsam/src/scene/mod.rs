@@ -6,6 +6,7 @@
 pub mod builtin;
 mod emitter;
 mod expect;
+mod flock;
 mod load;
 mod probe;
 pub mod solid;
@@ -13,6 +14,7 @@ pub mod solid;
 pub use crate::formula::Formula;
 pub use emitter::{Emitter, Outlet, Sink};
 pub use expect::{By, Compare, Expect, Take, Validation, Variant};
+pub use flock::{Flock, FlockModel, Relation};
 pub use load::{Source, schema};
 pub use probe::{Component, End, Line, Norm, Of, Probe, Space};
 
@@ -60,6 +62,9 @@ pub struct Scene {
     /// Places where fluid vanishes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sink: Vec<Sink>,
+    /// Flocks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub flock: Vec<Flock>,
     /// Fields that pull on everything.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub force: Vec<Force>,
