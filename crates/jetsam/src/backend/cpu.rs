@@ -6,7 +6,7 @@
 use super::Backend;
 use crate::integrate::{Advance, bodies, particles};
 use crate::interact::cells::{Cells, Grid};
-use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
+use crate::interact::neighbours::{Around, NeighbourChunk, Places, with_scratch};
 use crate::interact::{CHUNK, boundary, density, forces, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
@@ -25,6 +25,7 @@ pub struct Cpu {
     neighbours: [Vec<NeighbourChunk>; Kind::COUNT],
     /// The other half of the double buffers of `cells`.
     spare: Spare,
+    places: Places,
     /// Where the particle of each rigid or static slot stands.
     place: Vec<AtomicU32>,
     share: Vec<f32>,
@@ -51,6 +52,7 @@ impl Default for Cpu {
             cells: Default::default(),
             neighbours: Default::default(),
             spare: Spare::default(),
+            places: Places::default(),
             place: Vec::new(),
             share: Vec::new(),
             parts: Vec::new(),
@@ -71,6 +73,7 @@ impl Backend for Cpu {
         let p = &state.particles;
         self.spare = Spare { record: p.record.clone(), id: p.id.clone(), owner: p.owner.clone() };
         self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
+        self.places = Places::new(p.record.len());
         self.share = vec![0.0; state.particles.record.len()];
         self.parts = bodies::parts(&state.bodies.body);
         self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
@@ -143,15 +146,18 @@ impl Cpu {
         std::mem::swap(&mut p.id, &mut from.id);
         std::mem::swap(&mut p.owner, &mut from.owner);
         let n = fluid.len();
+        let [x, y, z] = &mut self.places.x;
         chunks_mut!(p.record, ..n)
             .zip(chunks_mut!(p.push_before, ..n))
             .zip(chunks_mut!(p.id, ..n))
             .zip(chunks_mut!(p.owner, ..n))
+            .zip(chunks_mut!(x, ..n).zip(chunks_mut!(y, ..n)).zip(chunks_mut!(z, ..n)))
             .zip(cells.order[..n].par_chunks(CHUNK))
-            .for_each(|((((record, push), id), owner), order)| {
+            .for_each(|(((((record, push), id), owner), ((x, y), z)), order)| {
                 for (k, place) in order.iter().enumerate() {
                     let place = place.load(Relaxed) as usize;
                     record[k] = from.record[place];
+                    [x[k], y[k], z[k]] = record[k].x;
                     push[k] = p.push[place];
                     id[k] = from.id[place];
                     owner[k] = from.owner[place];
@@ -180,15 +186,18 @@ impl Cpu {
         let range = range.start..range.start + slots.len();
         p.count[kind as usize] = inside;
         let (order, place, base) = (&cells.order, &self.place, range.start);
+        let [x, y, z] = &mut self.places.x;
         chunks_mut!(p.record, range.clone())
             .zip(chunks_mut!(p.id, range.clone()))
-            .zip(chunks_mut!(p.owner, range))
+            .zip(chunks_mut!(p.owner, range.clone()))
+            .zip(chunks_mut!(x, range.clone()).zip(chunks_mut!(y, range.clone())).zip(chunks_mut!(z, range)))
             .zip(order[..slots.len()].par_chunks(CHUNK))
             .enumerate()
-            .for_each(|(c, (((record, id), owner), order))| {
+            .for_each(|(c, ((((record, id), owner), ((x, y), z)), order))| {
                 for (k, from) in order.iter().enumerate() {
                     let slot = slots.start + from.load(Relaxed) as usize;
                     record[k] = b.record[slot];
+                    [x[k], y[k], z[k]] = record[k].x;
                     id[k] = slot as u32;
                     owner[k] = b.owner[slot];
                     let at = c * CHUNK + k;
@@ -202,6 +211,7 @@ impl Cpu {
         let around = Around {
             grid: &model.grid,
             records: &p.record,
+            places: &self.places,
             owner: &p.owner,
             cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
             first: p.first,

@@ -247,6 +247,23 @@ impl Cells {
 }
 
 impl Cells {
+    /// Where cell `c`, of a particle that was sorted, ends in the sorted order.
+    #[inline(always)]
+    pub fn end(&self, c: [i32; 3]) -> usize {
+        self.start[self.window.index(c) + 1] as usize
+    }
+
+    /// Whether the 27 cells around `c` touch the box of occupied cells. Across a periodic side they may.
+    #[inline(always)]
+    pub fn may_be_near(&self, grid: &Grid, c: [i32; 3]) -> bool {
+        let w = &self.window;
+        w.cells[0] > 0
+            && (0..3).all(|a| {
+                let within = c[a] + 1 >= w.min[a] && c[a] <= w.min[a] + w.cells[a];
+                within || grid.period[a] > 0.0 && (c[a] == 0 || c[a] == grid.cells[a] - 1)
+            })
+    }
+
     /// Places, in the sorted order, of the particles in cells `from..=to` of the row at `y`, `z`.
     #[inline(always)]
     pub fn row(&self, from: i32, to: i32, y: i32, z: i32) -> std::ops::Range<usize> {
