@@ -169,6 +169,7 @@ impl Cpu {
         // static particles stay where they are: once into each half of the double buffer
         if self.static_copies < 2 {
             self.copy_bodies(grid, Kind::Static);
+            self.cells[Kind::Static as usize].map(grid);
             self.static_copies += 1;
         }
     }
@@ -261,6 +262,9 @@ impl Cpu {
             let (records, owner, first) = (&p.record, &p.owner, segment.start);
             chunks_mut!(self.share, segment.clone()).zip(&self.neighbours[kind as usize]).enumerate().for_each(
                 |(c, (share, chunk))| {
+                    if !chunk.found {
+                        return share.fill(0.0);
+                    }
                     dispatch!(level, simd => {
                         boundary::chunk(simd, model, records, owner, first + c * CHUNK, chunk, share);
                     });
@@ -281,6 +285,9 @@ impl Cpu {
             let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
             let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut [[f32; 3]]| {
                 let (first, dt) = (first + c * CHUNK, advance.dt as f32);
+                if !chunk.found && kind == Kind::Static {
+                    return push.fill([0.0; 3]);
+                }
                 let input = forces::Input { model, records, owner, first, particle_mass, dt };
                 dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry));
             };

@@ -37,7 +37,7 @@ pub fn chunk<S: Simd>(
         }
         let own = &records[first + k];
         let (mut total, mut weight): (Lanes, Lanes) = ([0.0; LANES], [0.0; LANES]);
-        for list in chunk.list[runs.padded(Kind::Fluid)].as_chunks::<LANES>().0 {
+        for list in chunk.list()[runs.padded(Kind::Fluid)].as_chunks::<LANES>().0 {
             let other = gather(simd, records, list);
             let (d, mut r_sq) = wrap_lanes(model, own.x, &other.x);
             for l in 0..LANES {

@@ -86,6 +86,12 @@ impl Grid {
         })
     }
 
+    /// Index of a cell of the grid.
+    #[inline(always)]
+    fn index(&self, c: [i32; 3]) -> usize {
+        (c[2] as usize * self.cells[1] as usize + c[1] as usize) * self.cells[0] as usize + c[0] as usize
+    }
+
     /// Brings a position on periodic axes back into the domain.
     #[inline]
     pub fn wrap(&self, x: &mut [f32; 3]) {
@@ -174,6 +180,8 @@ pub struct Cells {
     pub lost: usize,
     /// Particles whose position was not finite, at this sort.
     pub nonfinite: usize,
+    /// A bit for each cell of the grid: whether there are particles in the cells around. Empty if not mapped.
+    map: Vec<u64>,
     keys: Vec<u32>,
     counts: Vec<Vec<u32>>,
 }
@@ -253,15 +261,44 @@ impl Cells {
         self.start[self.window.index(c) + 1] as usize
     }
 
-    /// Whether the 27 cells around `c` touch the box of occupied cells. Across a periodic side they may.
+    /// Whether there may be particles in the 27 cells around `c`: exact where the cells have been mapped.
     #[inline(always)]
-    pub fn may_be_near(&self, grid: &Grid, c: [i32; 3]) -> bool {
+    pub fn are_near(&self, grid: &Grid, c: [i32; 3]) -> bool {
+        if !self.map.is_empty() {
+            let at = grid.index(c);
+            return self.map[at / 64] >> (at % 64) & 1 == 1;
+        }
         let w = &self.window;
         w.cells[0] > 0
             && (0..3).all(|a| {
                 let within = c[a] + 1 >= w.min[a] && c[a] <= w.min[a] + w.cells[a];
                 within || grid.period[a] > 0.0 && (c[a] == 0 || c[a] == grid.cells[a] - 1)
             })
+    }
+
+    /// Maps where particles are near, for a kind that stays where it is.
+    pub fn map(&mut self, grid: &Grid) {
+        self.map.clear();
+        self.map.resize(grid.cells.iter().map(|&n| n as usize).product::<usize>().div_ceil(64), 0);
+        let w = self.window;
+        for (cell, bounds) in self.start[..=w.len()].windows(2).enumerate() {
+            if bounds[0] == bounds[1] {
+                continue;
+            }
+            let (x, yz) = (cell as i32 % w.cells[0], cell as i32 / w.cells[0]);
+            let c = [x, yz % w.cells[1], yz / w.cells[1]];
+            for k in 0..27 {
+                let around = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
+                let c = std::array::from_fn(|a| {
+                    let c = w.min[a] + c[a] + around[a];
+                    if grid.period[a] > 0.0 { c.rem_euclid(grid.cells[a]) } else { c }
+                });
+                if (0..3).all(|a| (0..grid.cells[a]).contains(&c[a])) {
+                    let at = grid.index(c);
+                    self.map[at / 64] |= 1 << (at % 64);
+                }
+            }
+        }
     }
 
     /// Places, in the sorted order, of the particles in cells `from..=to` of the row at `y`, `z`.

@@ -61,7 +61,7 @@ fn on_fluid<S: Simd>(simd: S, input: &Input, chunk: &NeighbourChunk, runs: &Runs
     let owner = input.owner[i];
     let me = &model.fluids[owner as usize];
     let mut pairs = Pairs::new(model, own);
-    let run = |kind| chunk.list[runs.padded(kind)].as_chunks::<LANES>().0;
+    let run = |kind| chunk.list()[runs.padded(kind)].as_chunks::<LANES>().0;
     for list in run(Kind::Fluid) {
         let (mu_sum, eta) = if model.fluids.len() == 1 {
             ([2.0 * me.viscosity; LANES], [me.artificial; LANES])
@@ -87,7 +87,7 @@ fn on_fluid<S: Simd>(simd: S, input: &Input, chunk: &NeighbourChunk, runs: &Runs
     let mut contacts = Vec3::ZERO;
     for kind in [Kind::Rigid, Kind::Static] {
         if springs(model, kind, own) {
-            let list = &chunk.list[runs.exact(kind)];
+            let list = &chunk.list()[runs.exact(kind)];
             contacts += sum_contacts(input, own, list, |(_, body)| Some(model.coupling_pair(owner, body)));
         }
     }
@@ -105,7 +105,7 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, 
     let mut force = Vec3::ZERO;
     if kind == Kind::Static || model.solver.coupling == Coupling::Pressure {
         let mut pairs = Pairs::new(model, own);
-        for list in chunk.list[runs.padded(Kind::Fluid)].as_chunks::<LANES>().0 {
+        for list in chunk.list()[runs.padded(Kind::Fluid)].as_chunks::<LANES>().0 {
             let mu_sum = if model.fluids.len() == 1 {
                 [2.0 * model.fluids[0].viscosity; LANES]
             } else {
@@ -118,12 +118,12 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, 
         }
         force += pairs.force(simd);
     }
-    let fluids = &chunk.list[runs.exact(Kind::Fluid)];
+    let fluids = &chunk.list()[runs.exact(Kind::Fluid)];
     force += sum_contacts(input, own, fluids, |(other, fluid)| {
         springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
     });
     for other in [Kind::Rigid, Kind::Static] {
-        let list = &chunk.list[runs.exact(other)];
+        let list = &chunk.list()[runs.exact(other)];
         force += sum_contacts(input, own, list, |(_, body)| Some(model.contact_pair(owner, body)));
     }
     if kind == Kind::Rigid {

@@ -30,11 +30,14 @@ impl Runs {
     /// Where the run of a kind stands in the chunk's list, padding included.
     #[inline(always)]
     pub fn padded(&self, kind: Kind) -> Range<usize> {
-        let mut begin = self.begin as usize;
-        for k in 0..kind as usize {
-            begin += padded(self.count[k] as usize);
-        }
-        begin..begin + padded(self.count[kind as usize] as usize)
+        let length = |k| padded(self.count(k));
+        let begin = self.begin as usize
+            + match kind {
+                Kind::Fluid => 0,
+                Kind::Rigid => length(Kind::Fluid),
+                Kind::Static => length(Kind::Fluid) + length(Kind::Rigid),
+            };
+        begin..begin + length(kind)
     }
 
     /// Where the run of a kind stands in the chunk's list, neighbours only.
@@ -48,8 +51,8 @@ impl Runs {
 /// Neighbours of a chunk of particles. Kept from step to step, so that nothing is allocated once sizes settle.
 #[derive(Clone, Debug, Default)]
 pub struct NeighbourChunk {
-    /// All runs, one after another.
-    pub list: Vec<u32>,
+    list: Vec<u32>,
+    used: usize,
     /// Runs of each particle of the chunk.
     pub runs: Vec<Runs>,
     /// Whether any particle of the chunk has neighbours: most of a wall is far from everything.
@@ -127,6 +130,12 @@ fn acting(kind: Kind) -> &'static [Kind] {
 }
 
 impl NeighbourChunk {
+    /// All runs, one after another.
+    #[inline(always)]
+    pub fn list(&self) -> &[u32] {
+        &self.list[..self.used]
+    }
+
     /// Finds the neighbours of the particles `members` (indices) of kind `kind`, and calls
     /// `each_cell(members of the cell, their runs, list, r_sq)` after each cell; list and squared distances (m^2; `H^2`
     /// in the padding) are those of the cell alone and begin with the cell's first run.
@@ -189,6 +198,7 @@ impl NeighbourChunk {
             each_cell(from..to, &self.runs[first_run..], &self.list[base..used], r_sq);
             from = to;
         }
+        self.used = used;
     }
 }
 
@@ -248,7 +258,7 @@ impl Around<'_> {
     fn rows(&self, kind: Kind, cell: [i32; 3], rows: &mut [Row; 27]) -> usize {
         let mut count = 0;
         let (grid, cells) = (self.grid, self.cells[kind as usize]);
-        if !cells.may_be_near(grid, cell) {
+        if !cells.are_near(grid, cell) {
             return 0;
         }
         let first = self.first[kind as usize];
