@@ -50,8 +50,8 @@ impl Grid {
             inverse: [0.0; 3],
             cells: [1; 3],
             period: [0.0; 3],
-            lower: [f32::NEG_INFINITY; 3],
-            upper: [f32::INFINITY; 3],
+            lower: [f32::MIN; 3],
+            upper: [f32::MAX; 3],
         };
         for a in 0..3 {
             if dimensions == 2 && a == 1 {
@@ -113,8 +113,14 @@ impl Grid {
     }
 
     /// Why a particle at `x` is no longer part of the simulation; 0 if it is.
-    #[inline]
+    #[inline(always)]
     fn gone(&self, x: [f32; 3]) -> u32 {
+        let inside = (0..3).fold(true, |inside, a| inside & (x[a] >= self.lower[a]) & (x[a] <= self.upper[a]));
+        if inside { 0 } else { self.why_gone(x) }
+    }
+
+    #[cold]
+    fn why_gone(&self, x: [f32; 3]) -> u32 {
         if !x.iter().all(|c| c.is_finite()) {
             return NONFINITE;
         }
@@ -140,17 +146,19 @@ pub struct Window {
 impl Window {
     const EMPTY: Self = Self { min: [i32::MAX; 3], cells: [0; 3] };
 
-    fn around(c: [i32; 3]) -> Self {
-        Self { min: c, cells: [1; 3] }
-    }
-
-    fn union(self, other: Self) -> Self {
-        if self.cells[0] == 0 || other.cells[0] == 0 {
-            return if self.cells[0] == 0 { other } else { self };
+    /// The box of cells that holds all records.
+    fn of(grid: &Grid, records: &[Record]) -> Self {
+        let chunks = records.par_chunks(CHUNK).map(|chunk| {
+            let mut ends = Ends::NONE;
+            chunk.iter().for_each(|r| ends = ends.with(r.x, r.x));
+            ends
+        });
+        let Ends([low, high]) = chunks.reduce(|| Ends::NONE, |a, b| a.with(b.0[0], b.0[1]));
+        if (0..3).any(|a| low[a] > high[a]) {
+            return Self::EMPTY;
         }
-        let end = |w: &Self, a: usize| w.min[a] + w.cells[a];
-        let min = std::array::from_fn(|a| self.min[a].min(other.min[a]));
-        Self { min, cells: std::array::from_fn(|a| end(&self, a).max(end(&other, a)) - min[a]) }
+        let (min, max) = (grid.coordinates(low), grid.coordinates(high));
+        Self { min, cells: std::array::from_fn(|a| max[a] - min[a] + 1) }
     }
 
     fn len(&self) -> usize {
@@ -162,6 +170,23 @@ impl Window {
     fn index(&self, c: [i32; 3]) -> usize {
         let [x, y, z] = [c[0] - self.min[0], c[1] - self.min[1], c[2] - self.min[2]];
         ((z * self.cells[1] + y) * self.cells[0] + x) as usize
+    }
+}
+
+/// Lower and upper ends of a set of places (m).
+#[derive(Clone, Copy)]
+struct Ends([[f32; 3]; 2]);
+
+impl Ends {
+    const NONE: Self = Self([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]);
+
+    #[inline(always)]
+    fn with(self, low: [f32; 3], high: [f32; 3]) -> Self {
+        let pick = |a: f32, b: f32, less: bool| if less { b } else { a }; // what is not a number is passed over
+        Self([
+            std::array::from_fn(|a| pick(self.0[0][a], low[a], low[a] < self.0[0][a])),
+            std::array::from_fn(|a| pick(self.0[1][a], high[a], high[a] > self.0[1][a])),
+        ])
     }
 }
 
@@ -191,13 +216,7 @@ impl Cells {
     /// particles are still inside.
     pub fn sort(&mut self, grid: &Grid, records: &[Record], id: Option<&[u32]>) -> usize {
         let n = records.len();
-        self.window = records
-            .par_chunks(CHUNK)
-            .map(|chunk| {
-                let living = chunk.iter().filter(|r| grid.gone(r.x) == 0);
-                living.fold(Window::EMPTY, |w, r| w.union(Window::around(grid.coordinates(r.x))))
-            })
-            .reduce(|| Window::EMPTY, Window::union);
+        self.window = Window::of(grid, records);
         let (window, cells) = (self.window, self.window.len());
         let bins = cells + NONFINITE as usize;
         self.start.resize(bins + 1, 0);
