@@ -1,5 +1,6 @@
 //! What does not change while a world runs: constants derived from the scene.
 
+use crate::integrate::sources::{Drain, Source};
 use crate::interact::cells::Grid;
 use crate::laws::kernel::{Kernel, KernelSet};
 use crate::scene::{Force, Solver};
@@ -30,6 +31,12 @@ pub struct Model {
     pub sound_speed: f64,
     /// Gravity (m/s^2).
     pub gravity: DVec3,
+    /// Sources of fluid (E31).
+    pub sources: Vec<Source>,
+    /// Sinks (E31).
+    pub drains: Vec<Drain>,
+    /// Seed of everything random.
+    pub seed: u64,
     /// Fields besides gravity (E30).
     pub fields: Vec<Force>,
     /// The box particles live in and its cells.
@@ -40,6 +47,8 @@ pub struct Model {
     pub solver: Solver,
     /// Bounds of the time step that do not change (s): each with its name.
     pub dt_bounds: Vec<(DtBound, f64)>,
+    /// Whether walls and bodies show viscosity the fluid's velocity mirrored (Adami et al. 2012).
+    pub no_slip: bool,
     /// Number of neighbours inside a full support, about: `4/3 pi (H/dx)^3`, or `pi (H/dx)^2`.
     pub full_support: f64,
     /// What was repaired or looks doubtful.
@@ -51,6 +60,10 @@ pub struct Model {
 pub struct Factors {
     /// From the density kernel's `w(s)` to `W` (1/m^d): a resting lattice has density `rho_0` exactly.
     pub w: f32,
+    /// `W` at the distance of one spacing (1/m^d).
+    pub w_spacing: f32,
+    /// `W` at no distance (1/m^d).
+    pub w_own: f32,
     /// From the force kernel's `g(s)` to `G = (1/r) dW/dr` (1/m^(d+2)): the gradient of a linear field on a lattice
     /// is exact, and with it the Laplacian of E5.
     pub g: f32,
@@ -66,7 +79,8 @@ impl Factors {
         let g = force.norm(dimensions) / support.powi(d + 2) / force.lattice_gradient(spacings, dimensions);
         let laplacian = Kernel::laplacian_norm(dimensions) / support.powi(d + 2);
         let laplacian = laplacian / Kernel::lattice_laplacian(spacings, dimensions);
-        Self { w: w as f32, g: g as f32, laplacian: laplacian as f32 }
+        let at = |s: f64| w as f32 * density.w(s as f32);
+        Self { w: w as f32, w_spacing: at(1.0 / spacings), w_own: at(0.0), g: g as f32, laplacian: laplacian as f32 }
     }
 }
 
@@ -85,6 +99,10 @@ pub struct FluidModel {
     pub stiffness: f32,
     /// `alpha rho_0 c_0 h` (Pa s), E5.
     pub artificial: f32,
+    /// How long a particle lives (s); infinite unless the scene says.
+    pub lifetime: f64,
+    /// `delta h c_0 / stiffness` (m^2/s/Pa), E1.
+    pub diffusion: f32,
 }
 
 /// Contact numbers of a body (E14).

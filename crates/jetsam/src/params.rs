@@ -49,6 +49,8 @@ params! {
     sound_speed: "solver.sound_speed", "m/s", _, 1e-9, 1e6;
     artificial_viscosity: "solver.artificial_viscosity", "1", 0.05, 0.0, 10.0;
     xsph: "solver.xsph", "1", 0.0, 0.0, 1.0;
+    shifting: "solver.shifting", "1", 0.0, 0.0, 5.0;
+    density_diffusion: "solver.density_diffusion", "1", 0.1, 0.0, 1.0;
     dt: "solver.dt", "s", _, 1e-12, 1e3;
     courant: "solver.courant", "1", 0.4, 1e-3, 1.0;
     courant_force: "solver.courant_force", "1", 0.25, 1e-3, 1.0;
@@ -59,6 +61,18 @@ params! {
     fluid_density: "fluid.density", "kg/m^3", 1000.0, 1e-6, 1e6;
     fluid_viscosity: "fluid.viscosity", "Pa s", 0.001, 0.0, 1e6;
     fluid_velocity: "fluid.velocity", "m/s", _, -1e5, 1e5;
+    fluid_lifetime: "fluid.lifetime", "s", _, 1e-6, 1e6;
+    emitter_start: "emitter.start", "s", 0.0, 0.0, 1e6;
+    emitter_stop: "emitter.stop", "s", _, 0.0, 1e6;
+    emitter_count: "emitter.count", "1", 1e9, 1.0, 1e9;
+    emitter_jitter: "emitter.jitter", "dx", 0.0, 0.0, 0.5;
+    emitter_speed: "emitter.outlet.hose.speed", "m/s", _, 1e-9, 1e5;
+    emitter_rate: "emitter.outlet.hose.rate", "m^3/s", _, 1e-18, 1e9;
+    emitter_radius: "emitter.outlet.hose.radius", "m", _, 1e-9, 1e3;
+    emitter_velocity: "emitter.outlet.burst.velocity", "m/s", _, -1e5, 1e5;
+    emitter_period: "emitter.outlet.burst.period", "s", _, 1e-6, 1e6;
+    sink_start: "sink.start", "s", 0.0, 0.0, 1e6;
+    sink_stop: "sink.stop", "s", _, 0.0, 1e6;
     rigid_density: "rigid.density", "kg/m^3", _, 1e-6, 1e6;
     rigid_mass: "rigid.mass", "kg", _, 1e-12, 1e12;
     rigid_velocity: "rigid.velocity", "m/s", _, -1e5, 1e5;

@@ -8,6 +8,8 @@ use serde::Serialize;
 pub enum Stage {
     /// Half a kick and the drift of every particle and body; velocities are predicted to the step's end.
     Drift,
+    /// Fluid born and drained (E31).
+    Sources,
     /// Particles sorted into cells as wide as the support.
     Cells,
     /// Neighbours found once for all laws; densities of fluids (E1).
@@ -28,8 +30,9 @@ pub enum Stage {
 
 impl Stage {
     /// The order of a step of weakly compressible SPH.
-    pub const WCSPH: [Stage; 9] = [
+    pub const WCSPH: [Stage; 10] = [
         Stage::Drift,
+        Stage::Sources,
         Stage::Cells,
         Stage::Density,
         Stage::Pressure,
@@ -44,6 +47,7 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Stage::Drift => "drift",
+            Stage::Sources => "sources",
             Stage::Cells => "cells",
             Stage::Density => "density",
             Stage::Pressure => "pressure",
@@ -57,6 +61,6 @@ impl Stage {
 
     /// Whether the stage evaluates forces at the present positions: what has to run once before the first step.
     pub fn evaluates(self) -> bool {
-        !matches!(self, Stage::Drift | Stage::Kick)
+        !matches!(self, Stage::Drift | Stage::Sources | Stage::Kick)
     }
 }

@@ -21,6 +21,7 @@ pub struct World {
     meshes: Vec<Option<(Arc<Mesh>, DVec3)>>,
     time: f64,
     steps: u64,
+    dt_before: f64,
     timers: [Duration; Stage::WCSPH.len()],
     bound_by: Vec<(DtBound, u64)>,
     momentum: MomentumLedger,
@@ -80,6 +81,7 @@ impl World {
             meshes,
             time: 0.0,
             steps: 0,
+            dt_before: 0.0,
             timers: Default::default(),
             bound_by: Vec::new(),
             momentum: MomentumLedger::default(),
@@ -95,12 +97,13 @@ impl World {
     /// One step, no longer than `longest` (s).
     pub fn step(&mut self, longest: f64) -> StepReport {
         let (dt, bound) = self.next_dt(longest);
-        let advance = Advance { dt, drag: 0.0 };
+        let advance = Advance { time: self.time, dt, dt_before: self.dt_before, drag: 0.0 };
         for (stage, timer) in Stage::WCSPH.into_iter().zip(&mut self.timers) {
             let start = Instant::now();
             self.backend.run(stage, &self.model, advance);
             *timer += start.elapsed();
         }
+        self.dt_before = dt;
         self.time += dt;
         self.steps += 1;
         self.record(dt, bound)
@@ -155,9 +158,11 @@ impl World {
         let mut time = 0.0;
         while time < end {
             let (dt, _) = self.next_dt(end - time);
+            let advance = Advance { time: 0.0, dt, dt_before: self.dt_before, drag };
             for stage in Stage::WCSPH {
-                self.backend.run(stage, &self.model, Advance { dt, drag });
+                self.backend.run(stage, &self.model, advance);
             }
+            self.dt_before = dt;
             time += dt;
         }
     }
@@ -168,7 +173,7 @@ impl World {
             Some((_, n)) => *n += 1,
             None => self.bound_by.push((bound, 1)),
         }
-        self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force);
+        self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force) + ledger.crossed;
         self.momentum.force = ledger.external_force;
         let (at_rest, _) = self.model.largest_dt(0.0, 0.0);
         let trouble = if ledger.nonfinite > 0 || !dt.is_finite() {

@@ -3,10 +3,15 @@
 use super::bodies::NewBody;
 use super::near::Near;
 use crate::error::Result;
+use crate::integrate::sources::Source;
 use crate::interact::cells::Grid;
 use crate::model::{ContactModel, DtBound, Factors, FluidModel, Model};
 use crate::scene::{Coupling, EquationOfState, Scene, Start};
 use glam::DVec3;
+
+/// Reynolds number of a spacing below which walls show a mirrored velocity to viscosity: above, the layer that does not slip
+/// is thinner than particles can show.
+const NO_SLIP_BELOW: f64 = 1000.0;
 
 /// A fluid particle on its way into the state.
 pub(super) struct Drop {
@@ -16,6 +21,8 @@ pub(super) struct Drop {
     pub(super) v: DVec3,
     /// Index of its fluid.
     pub(super) fluid: u32,
+    /// Relative density `D`.
+    pub(super) density: f64,
 }
 
 impl Scene {
@@ -35,7 +42,8 @@ impl Scene {
         let (mut carved, mut outside) = (0, 0);
         for (index, f) in self.fluid.iter().enumerate() {
             let key = format!("fluid.{index}.shape");
-            let solid = self.solid(&f.shape, &key)?;
+            let Some(shape) = &f.shape else { continue };
+            let solid = self.solid(shape, &key)?;
             warnings.extend(solid.warnings.iter().cloned());
             let before = fluid.len();
             for p in solid.points {
@@ -50,7 +58,7 @@ impl Scene {
                     if self.world.dimensions == 2 {
                         v.y = 0.0;
                     }
-                    fluid.push(Drop { x: p, v, fluid: index as u32 });
+                    fluid.push(Drop { x: p, v, fluid: index as u32, density: 1.0 });
                 }
             }
             if fluid.len() == before {
@@ -68,7 +76,8 @@ impl Scene {
             warnings.push(format!("{outside} fluid particles outside the domain were left out"));
         }
 
-        let largest_speed = self.largest_speed(&fluid, bodies, gravity, &grid);
+        let sources = self.sources()?;
+        let largest_speed = self.largest_speed(&fluid, bodies, &sources, gravity, &grid);
         let sound_speed = self.solver.sound_speed.unwrap_or(10.0 * largest_speed);
         self.squeeze(&mut fluid, gravity, sound_speed);
         let fluids: Vec<FluidModel> = self
@@ -81,6 +90,8 @@ impl Scene {
                 viscosity: f.viscosity as f32,
                 stiffness: (sound_speed * sound_speed * f.density) as f32,
                 artificial: (self.solver.artificial_viscosity * f.density * sound_speed * 0.5 * support) as f32,
+                lifetime: f.lifetime.unwrap_or(f64::INFINITY),
+                diffusion: (self.solver.density_diffusion * 0.5 * support / (sound_speed * f.density)) as f32,
             })
             .collect();
         let contacts = bodies
@@ -106,11 +117,16 @@ impl Scene {
             largest_speed,
             sound_speed,
             gravity,
+            sources,
+            drains: self.drains()?,
+            seed: self.world.seed,
             fields: self.force.clone(),
             grid,
             contact_diameter: self.solver.contact_diameter * spacing,
             solver: self.solver.clone(),
             dt_bounds: Vec::new(),
+            no_slip: !self.solver.walls_slip
+                && self.fluid.iter().any(|f| f.density * largest_speed * spacing < NO_SLIP_BELOW * f.viscosity),
             full_support: if self.world.dimensions == 3 {
                 4.0 / 3.0 * std::f64::consts::PI * self.solver.support.powi(3)
             } else {
@@ -123,7 +139,14 @@ impl Scene {
     }
 
     /// Largest speed the scene can reach (m/s): from depth, drop height and velocities given.
-    fn largest_speed(&self, fluid: &[Drop], bodies: &[NewBody], gravity: DVec3, grid: &Grid) -> f64 {
+    fn largest_speed(
+        &self,
+        fluid: &[Drop],
+        bodies: &[NewBody],
+        sources: &[Source],
+        gravity: DVec3,
+        grid: &Grid,
+    ) -> f64 {
         let g = gravity.length();
         let mut speed: f64 = 0.0;
         if g > 0.0 {
@@ -142,6 +165,11 @@ impl Scene {
             if top.is_finite() {
                 speed = (2.0 * g * (top - floor).max(0.0)).sqrt();
             }
+            for source in sources {
+                let top = source.points.iter().map(|&p| height(p)).fold(f64::NEG_INFINITY, f64::max);
+                let drop = (top - height(corner(false))).max(0.0);
+                speed = speed.max((2.0 * g * drop + source.velocity.length_squared()).sqrt());
+            }
             // bodies fall onto the fluid, or onto the floor where there is none
             let ground = if top.is_finite() { top } else { height(corner(false)) };
             for body in bodies.iter().filter(|b| b.mass.is_finite()) {
@@ -151,6 +179,9 @@ impl Scene {
         }
         for f in &self.fluid {
             speed = speed.max(DVec3::from(f.velocity).length());
+        }
+        for source in sources {
+            speed = speed.max(source.velocity.length());
         }
         for body in bodies {
             let reach = body.offset.iter().map(|o| o.length()).fold(0.0, f64::max);
@@ -190,7 +221,13 @@ impl Scene {
             };
             for p in fluid.iter_mut().filter(|p| p.fluid == index as u32) {
                 let y = p.x.dot(up) - bottom;
-                p.x += (squeezed(y) - y) * up;
+                let now = squeezed(y);
+                p.x += (now - y) * up;
+                let above = g * (squeezed(depth) - now).max(0.0) / c_sq;
+                p.density = match self.solver.equation_of_state {
+                    EquationOfState::Linear => above.exp(),
+                    EquationOfState::Tait => (1.0 + 6.0 * above).powf(1.0 / 6.0),
+                };
             }
         }
     }

@@ -4,12 +4,13 @@
 //! are made in their order: the same bits for any number of threads.
 
 use super::Backend;
-use crate::integrate::{Advance, bodies, particles};
+use crate::integrate::{Advance, bodies, particles, sources};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::neighbours::{Around, NeighbourChunk, Places, with_scratch};
 use crate::interact::{CHUNK, boundary, density, forces, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
+use crate::scene::Density;
 use crate::stage::Stage;
 use crate::state::{Kind, Record, State};
 use fearless_simd::{Level, dispatch};
@@ -29,11 +30,16 @@ pub struct Cpu {
     /// Where the particle of each rigid or static slot stands.
     place: Vec<AtomicU32>,
     share: Vec<f32>,
+    /// Velocities that bodies' particles show to viscosity (m/s), all particles; empty where they show their own.
+    mirror: Vec<[f32; 4]>,
     parts: Vec<bodies::Part>,
     particle_mass: Vec<f32>,
     sums: Vec<Ledger>,
     ledger: Ledger,
     static_copies: u32,
+    next_id: u32,
+    /// Force that holds fluid inside hoses to their speed (N).
+    held: DVec3,
 }
 
 /// Arrays that `cells` writes while it reads their twins.
@@ -42,6 +48,9 @@ struct Spare {
     record: Vec<Record>,
     id: Vec<u32>,
     owner: Vec<u32>,
+    density: Vec<f32>,
+    rate: Vec<[f32; 2]>,
+    born: Vec<f32>,
 }
 
 impl Default for Cpu {
@@ -55,11 +64,14 @@ impl Default for Cpu {
             places: Places::default(),
             place: Vec::new(),
             share: Vec::new(),
+            mirror: Vec::new(),
             parts: Vec::new(),
             particle_mass: Vec::new(),
             sums: Vec::new(),
             ledger: Ledger::default(),
             static_copies: 0,
+            next_id: 0,
+            held: DVec3::ZERO,
         }
     }
 }
@@ -71,7 +83,14 @@ impl Backend for Cpu {
 
     fn upload(&mut self, state: State) {
         let p = &state.particles;
-        self.spare = Spare { record: p.record.clone(), id: p.id.clone(), owner: p.owner.clone() };
+        self.spare = Spare {
+            record: p.record.clone(),
+            id: p.id.clone(),
+            owner: p.owner.clone(),
+            density: p.density.clone(),
+            rate: p.rate.clone(),
+            born: p.born.clone(),
+        };
         self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
         self.places = Places::new(p.record.len());
         self.share = vec![0.0; state.particles.record.len()];
@@ -79,17 +98,22 @@ impl Backend for Cpu {
         self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
         self.ledger = Ledger::default();
         self.static_copies = 0;
+        self.next_id = p.count[Kind::Fluid as usize] as u32;
         self.state = state;
     }
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
         match stage {
             Stage::Drift => self.drift(model, advance),
-            Stage::Cells => self.sort(&model.grid),
+            Stage::Sources => self.sources(model, advance),
+            Stage::Cells => self.sort(model),
             Stage::Density => self.density(model),
             Stage::Pressure => self.pressure(model),
             Stage::Boundary => self.boundary(model),
-            Stage::Forces => self.forces(model, advance),
+            Stage::Forces => {
+                self.forces(model, advance);
+                self.held = sources::hold(&mut self.state.particles, model);
+            }
             Stage::Bodies => self.bodies(model),
             Stage::Kick => self.kick(model, advance),
             Stage::Ledger => self.tally(model),
@@ -126,14 +150,47 @@ impl Cpu {
                 particles::drift(model.solver.integrator, advance, &model.grid, records, push, carry);
             },
         );
+        if !p.rate.is_empty() {
+            let n = p.count[Kind::Fluid as usize];
+            chunks_mut!(p.density, ..n)
+                .zip(chunks_mut!(p.rate, ..n))
+                .zip(p.carry[..n].par_chunks(CHUNK))
+                .for_each(|((density, rate), carry)| particles::predict(advance, density, rate, carry));
+        }
         if advance.drag == 0.0 {
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::drift(body, model, advance.dt));
             bodies::follow(b, model);
         }
     }
 
+    /// Fluid is born and drained (E31). Where the fluid's segment has to grow, bodies' particles move up.
+    fn sources(&mut self, model: &Model, advance: Advance) {
+        self.ledger.crossed = DVec3::ZERO;
+        if advance.drag > 0.0 {
+            return;
+        }
+        let p = &mut self.state.particles;
+        let (before, id) = (p.first, self.next_id);
+        self.ledger.crossed += sources::bear(p, model, advance.time, advance.dt, &mut self.next_id);
+        self.ledger.born += u64::from(self.next_id - id);
+        if p.first != before {
+            let total = p.record.len();
+            self.spare.record.resize(total, Record::default());
+            self.spare.id.resize(total, 0);
+            self.spare.owner.resize(total, 0);
+            self.spare.density.resize(p.density.len(), 1.0);
+            self.spare.rate.resize(p.rate.len(), [0.0; 2]);
+            self.spare.born.resize(p.born.len(), 0.0);
+            self.places = Places::new(total);
+            self.share.resize(total, 0.0);
+            self.static_copies = 0;
+        }
+        sources::drain(p, model, advance.time + advance.dt);
+    }
+
     /// Sorts every kind. Fluids change places for good; particles of bodies are copied from their slots.
-    fn sort(&mut self, grid: &Grid) {
+    fn sort(&mut self, model: &Model) {
+        let grid = &model.grid;
         let p = &mut self.state.particles;
         let from = &mut self.spare;
         let fluid = p.segment(Kind::Fluid);
@@ -142,6 +199,7 @@ impl Cpu {
         self.ledger.left += cells.left as u64;
         self.ledger.lost += cells.lost as u64;
         self.ledger.nonfinite += cells.nonfinite as u64;
+        self.ledger.drained += cells.drained as u64;
         std::mem::swap(&mut p.record, &mut from.record);
         std::mem::swap(&mut p.id, &mut from.id);
         std::mem::swap(&mut p.owner, &mut from.owner);
@@ -163,6 +221,31 @@ impl Cpu {
                     owner[k] = from.owner[place];
                 }
             });
+        for k in living..n {
+            let momentum = model.fluids[p.owner[k] as usize].mass * glam::Vec3::from(p.record[k].v);
+            if momentum.is_finite() {
+                self.ledger.crossed -= momentum.as_dvec3();
+            }
+        }
+        if !p.born.is_empty() {
+            std::mem::swap(&mut p.born, &mut from.born);
+            chunks_mut!(p.born, ..n).zip(cells.order[..n].par_chunks(CHUNK)).for_each(|(born, order)| {
+                born.iter_mut().zip(order).for_each(|(b, place)| *b = from.born[place.load(Relaxed) as usize]);
+            });
+        }
+        if !p.rate.is_empty() {
+            std::mem::swap(&mut p.density, &mut from.density);
+            std::mem::swap(&mut p.rate, &mut from.rate);
+            chunks_mut!(p.density, ..n).zip(chunks_mut!(p.rate, ..n)).zip(cells.order[..n].par_chunks(CHUNK)).for_each(
+                |((density, rate), order)| {
+                    for (k, place) in order.iter().enumerate() {
+                        let place = place.load(Relaxed) as usize;
+                        density[k] = from.density[place];
+                        rate[k] = from.rate[place];
+                    }
+                },
+            );
+        }
         p.count[Kind::Fluid as usize] = living;
 
         self.copy_bodies(grid, Kind::Rigid);
@@ -225,7 +308,7 @@ impl Cpu {
             let chunks = &mut self.neighbours[kind as usize];
             chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
             let members = |c: usize| first + c * CHUNK..first + ((c + 1) * CHUNK).min(n);
-            if kind == Kind::Fluid {
+            if kind == Kind::Fluid && model.solver.density == Density::Summation {
                 chunks.par_iter_mut().zip(chunks_mut!(p.density, ..n)).enumerate().for_each(|(c, (chunk, density))| {
                     with_scratch(|scratch| {
                         dispatch!(level, simd => {
@@ -257,19 +340,29 @@ impl Cpu {
     fn boundary(&mut self, model: &Model) {
         let p = &mut self.state.particles;
         let level = self.level;
+        if model.no_slip {
+            self.mirror.resize(p.record.len(), [0.0; 4]);
+        }
         for kind in [Kind::Rigid, Kind::Static] {
             let segment = p.segment(kind);
             let (records, owner, first) = (&p.record, &p.owner, segment.start);
-            chunks_mut!(self.share, segment.clone()).zip(&self.neighbours[kind as usize]).enumerate().for_each(
-                |(c, (share, chunk))| {
-                    if !chunk.found {
-                        return share.fill(0.0);
-                    }
-                    dispatch!(level, simd => {
-                        boundary::chunk(simd, model, records, owner, first + c * CHUNK, chunk, share);
-                    });
-                },
-            );
+            let neighbours = &self.neighbours[kind as usize];
+            let work = |c: usize, share: &mut [f32], chunk: &NeighbourChunk, mirror: &mut [[f32; 4]]| {
+                if !chunk.found {
+                    share.fill(0.0);
+                    return mirror.fill([0.0; 4]);
+                }
+                dispatch!(level, simd => {
+                    boundary::chunk(simd, model, records, owner, first + c * CHUNK, chunk, share, mirror);
+                });
+            };
+            let chunks = chunks_mut!(self.share, segment.clone()).zip(neighbours).enumerate();
+            if model.no_slip {
+                let mirror = chunks_mut!(self.mirror, segment.clone());
+                chunks.zip(mirror).for_each(|((c, (share, chunk)), mirror)| work(c, share, chunk, mirror));
+            } else {
+                chunks.for_each(|(c, (share, chunk))| work(c, share, chunk, &mut []));
+            }
             for (record, share) in p.record[segment.clone()].iter_mut().zip(&self.share[segment]) {
                 record.share = *share;
             }
@@ -279,16 +372,17 @@ impl Cpu {
     fn forces(&mut self, model: &Model, advance: Advance) {
         let p = &mut self.state.particles;
         let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
+        let (mirror, dt, fastest) = (&self.mirror[..], advance.dt as f32, self.ledger.speed as f32);
         for kind in Kind::ALL {
             let first = p.first[kind as usize];
             let segment = first..first + p.count[kind as usize];
             let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
-            let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut [[f32; 3]]| {
-                let (first, dt) = (first + c * CHUNK, advance.dt as f32);
+            let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut [[f32; 4]]| {
                 if !chunk.found && kind == Kind::Static {
                     return push.fill([0.0; 3]);
                 }
-                let input = forces::Input { model, records, owner, first, particle_mass, dt };
+                let first = first + c * CHUNK;
+                let input = forces::Input { model, records, mirror, owner, first, particle_mass, dt, fastest };
                 dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry));
             };
             if kind == Kind::Fluid && !p.carry.is_empty() {
@@ -320,6 +414,13 @@ impl Cpu {
             .for_each(|((records, push), before)| {
                 particles::kick(integrator, advance, records, push, before);
             });
+        if !p.rate.is_empty() {
+            let n = p.count[Kind::Fluid as usize];
+            chunks_mut!(p.density, ..n)
+                .zip(p.rate[..n].par_chunks(CHUNK))
+                .zip(p.carry[..n].par_chunks(CHUNK))
+                .for_each(|((density, rate), carry)| particles::correct(advance, density, rate, carry));
+        }
         if advance.drag == 0.0 {
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::kick(body, integrator, advance.dt));
         }
@@ -345,6 +446,10 @@ impl Cpu {
         });
         let mut total = Ledger {
             left: self.ledger.left,
+            born: self.ledger.born,
+            drained: self.ledger.drained,
+            crossed: self.ledger.crossed,
+            external_force: self.held,
             lost: self.ledger.lost,
             nonfinite: self.ledger.nonfinite,
             fluid: n,

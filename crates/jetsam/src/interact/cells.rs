@@ -38,6 +38,9 @@ pub struct Grid {
 const LEFT: u32 = 1;
 const LOST: u32 = 2;
 const NONFINITE: u32 = 3;
+const OUT: u32 = 4;
+/// The first coordinate of a fluid particle that a sink has taken.
+pub const DRAINED: f32 = f32::MAX;
 
 impl Grid {
     /// Cells for a domain. `wall` is how deep solid walls reach outside the domain (m).
@@ -124,6 +127,9 @@ impl Grid {
         if !x.iter().all(|c| c.is_finite()) {
             return NONFINITE;
         }
+        if x[0] == DRAINED {
+            return OUT;
+        }
         let mut gone = 0;
         for a in 0..3 {
             if x[a] < self.lower[a] || x[a] > self.upper[a] {
@@ -146,11 +152,11 @@ pub struct Window {
 impl Window {
     const EMPTY: Self = Self { min: [i32::MAX; 3], cells: [0; 3] };
 
-    /// The box of cells that holds all records.
+    /// The box of cells that holds all records inside the domain.
     fn of(grid: &Grid, records: &[Record]) -> Self {
         let chunks = records.par_chunks(CHUNK).map(|chunk| {
             let mut ends = Ends::NONE;
-            chunk.iter().for_each(|r| ends = ends.with(r.x, r.x));
+            chunk.iter().filter(|r| grid.gone(r.x) == 0).for_each(|r| ends = ends.with(r.x, r.x));
             ends
         });
         let Ends([low, high]) = chunks.reduce(|| Ends::NONE, |a, b| a.with(b.0[0], b.0[1]));
@@ -182,10 +188,9 @@ impl Ends {
 
     #[inline(always)]
     fn with(self, low: [f32; 3], high: [f32; 3]) -> Self {
-        let pick = |a: f32, b: f32, less: bool| if less { b } else { a }; // what is not a number is passed over
         Self([
-            std::array::from_fn(|a| pick(self.0[0][a], low[a], low[a] < self.0[0][a])),
-            std::array::from_fn(|a| pick(self.0[1][a], high[a], high[a] > self.0[1][a])),
+            std::array::from_fn(|a| if low[a] < self.0[0][a] { low[a] } else { self.0[0][a] }),
+            std::array::from_fn(|a| if high[a] > self.0[1][a] { high[a] } else { self.0[1][a] }),
         ])
     }
 }
@@ -207,6 +212,8 @@ pub struct Cells {
     pub nonfinite: usize,
     /// A bit for each cell of the grid: whether there are particles in the cells around. Empty if not mapped.
     map: Vec<u64>,
+    /// Particles that a sink has taken, at this sort.
+    pub drained: usize,
     keys: Vec<u32>,
     counts: Vec<Vec<u32>>,
 }
@@ -218,7 +225,7 @@ impl Cells {
         let n = records.len();
         self.window = Window::of(grid, records);
         let (window, cells) = (self.window, self.window.len());
-        let bins = cells + NONFINITE as usize;
+        let bins = cells + OUT as usize;
         self.start.resize(bins + 1, 0);
         self.keys.resize(n, 0);
         if self.order.len() < n {
@@ -269,7 +276,8 @@ impl Cells {
         self.left = (self.start[cells + 1] - self.start[cells]) as usize;
         self.lost = (self.start[cells + 2] - self.start[cells + 1]) as usize;
         self.nonfinite = (self.start[cells + 3] - self.start[cells + 2]) as usize;
-        n - self.left - self.lost - self.nonfinite
+        self.drained = (self.start[cells + 4] - self.start[cells + 3]) as usize;
+        n - self.left - self.lost - self.nonfinite - self.drained
     }
 }
 

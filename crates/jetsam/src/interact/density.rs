@@ -5,7 +5,7 @@
 
 use super::lanes::{Block, LANES, Lanes, sum};
 use super::neighbours::{Around, NeighbourChunk, Scratch};
-use crate::laws::kernel::Kernel;
+use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
 use crate::scene::Coupling;
 use crate::state::{Kind, Record};
@@ -73,22 +73,14 @@ pub fn body_chunk<S: Simd>(
     chunk.find(simd, scratch, around, kind, members, |_, _, _, _| {});
 }
 
-/// Squared distances become `w(s)`. One flat loop for each kernel: of short loops over sixteen lanes the compiler
-/// makes scalars.
+/// Squared distances become `w(s)`, in one flat loop: of short loops over sixteen lanes the compiler makes scalars.
 #[inline(always)]
 fn weigh(kernel: Kernel, inverse: f32, r_sq: &mut [f32]) {
-    macro_rules! flat {
-        ($($kernel:ident),*) => {
-            match kernel {
-                $(Kernel::$kernel => {
-                    for r in r_sq {
-                        *r = Kernel::$kernel.w(r.sqrt() * inverse);
-                    }
-                })*
-            }
-        };
-    }
-    flat!(Cubic, WendlandC2, WendlandC4, Quintic, Poly6, Spiky, Viscosity)
+    each_kernel!(kernel, K => {
+        for r in r_sq {
+            *r = K.w(r.sqrt() * inverse);
+        }
+    });
 }
 
 /// `sum w(s)` over a run of equal volumes.
@@ -118,37 +110,7 @@ fn sum_vw<S: Simd>(simd: S, w: &[Block], list: &[[u32; LANES]], records: &[Recor
 /// `w(s)` of sixteen squared distances.
 #[inline(always)]
 pub fn weights(kernel: Kernel, inverse: f32, r_sq: &Lanes) -> Lanes {
-    let mut s = [0.0; LANES];
-    for l in 0..LANES {
-        s[l] = r_sq[l].sqrt() * inverse;
-    }
-    each_lane(
-        kernel,
-        &s,
-        #[inline(always)]
-        |k, s| k.w(s),
-    )
-}
-
-/// A kernel function on sixteen lanes: the choice of kernel is made outside the lane loop.
-#[inline(always)]
-pub fn each_lane(kernel: Kernel, s: &Lanes, f: impl Fn(Kernel, f32) -> f32) -> Lanes {
-    macro_rules! lanes {
-        ($kernel:expr) => {{
-            let mut out = [0.0; LANES];
-            for l in 0..LANES {
-                out[l] = f($kernel, s[l]);
-            }
-            out
-        }};
-    }
-    match kernel {
-        Kernel::Cubic => lanes!(Kernel::Cubic),
-        Kernel::WendlandC2 => lanes!(Kernel::WendlandC2),
-        Kernel::WendlandC4 => lanes!(Kernel::WendlandC4),
-        Kernel::Quintic => lanes!(Kernel::Quintic),
-        Kernel::Poly6 => lanes!(Kernel::Poly6),
-        Kernel::Spiky => lanes!(Kernel::Spiky),
-        Kernel::Viscosity => lanes!(Kernel::Viscosity),
-    }
+    let mut w = *r_sq;
+    weigh(kernel, inverse, &mut w);
+    w
 }

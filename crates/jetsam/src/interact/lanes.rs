@@ -136,6 +136,63 @@ pub fn sum<S: Simd>(simd: S, a: &Lanes) -> f32 {
     (v[0] + v[2]) + (v[1] + v[3])
 }
 
+/// `a - b` lane by lane.
+#[inline(always)]
+pub fn minus<S: Simd>(simd: S, a: &Lanes, b: f32) -> Lanes {
+    (f32x16::load_array_ref(simd, a) - f32x16::splat(simd, b)).to_array()
+}
+
+/// `x^2 + y^2 + z^2` lane by lane.
+#[inline(always)]
+pub fn squares<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> Lanes {
+    let [x, y, z] = [x, y, z].map(|c| f32x16::load_array_ref(simd, c));
+    (x * x + y * y + z * z).to_array()
+}
+
+/// Particles and a list of indices into them, which are checked once for all.
+#[derive(Clone, Copy)]
+pub struct Listed<'a> {
+    records: &'a [Record],
+    list: &'a [u32],
+}
+
+/// Sixteen neighbours out of a checked list.
+#[derive(Clone, Copy)]
+pub struct Near<'a> {
+    records: &'a [Record],
+    /// Their indices.
+    pub index: &'a [u32; LANES],
+}
+
+impl<'a> Listed<'a> {
+    /// A list of whole vectors.
+    ///
+    /// # Panics
+    /// If an index is not below the number of records: a defect of the search.
+    #[inline(always)]
+    pub fn new<S: Simd>(simd: S, records: &'a [Record], list: &'a [u32]) -> Self {
+        let mut largest = u32x16::splat(simd, 0);
+        for block in list.as_chunks().0 {
+            largest = largest.max(u32x16::load_array_ref(simd, block));
+        }
+        let inside = largest.simd_lt(u32x16::splat(simd, records.len() as u32));
+        assert!(list.is_empty() || list.len() % LANES == 0 && simd.to_bitmask_mask32x16(inside) == 0xffff);
+        Self { records, list }
+    }
+
+    /// Part of the list as it is.
+    #[inline(always)]
+    pub fn indices(self, run: std::ops::Range<usize>) -> &'a [u32] {
+        &self.list[run]
+    }
+
+    /// Part of the list, vector by vector.
+    #[inline(always)]
+    pub fn run(self, run: std::ops::Range<usize>) -> impl Iterator<Item = Near<'a>> {
+        self.list[run].as_chunks().0.iter().map(move |index| Near { records: self.records, index })
+    }
+}
+
 /// Sixteen records side by side.
 pub struct Transposed {
     /// Positions (m).
@@ -148,20 +205,18 @@ pub struct Transposed {
     pub share: Lanes,
 }
 
-/// Loads the records named by 16 indices: 16 whole-record loads and three rounds of unzipping.
+/// Loads sixteen records: 16 whole-record loads and three rounds of unzipping.
 #[inline(always)]
-pub fn gather<S: Simd>(simd: S, records: &[Record], list: &[u32; LANES]) -> Transposed {
-    let inside = u32x16::load_array_ref(simd, list).simd_lt(u32x16::splat(simd, records.len() as u32));
-    assert!(simd.to_bitmask_mask32x16(inside) == 0xffff);
+pub fn gather<S: Simd>(simd: S, near: Near) -> Transposed {
     let r = [
-        pair(simd, records, list[0], list[1]),
-        pair(simd, records, list[2], list[3]),
-        pair(simd, records, list[4], list[5]),
-        pair(simd, records, list[6], list[7]),
-        pair(simd, records, list[8], list[9]),
-        pair(simd, records, list[10], list[11]),
-        pair(simd, records, list[12], list[13]),
-        pair(simd, records, list[14], list[15]),
+        pair(simd, near, 0),
+        pair(simd, near, 2),
+        pair(simd, near, 4),
+        pair(simd, near, 6),
+        pair(simd, near, 8),
+        pair(simd, near, 10),
+        pair(simd, near, 12),
+        pair(simd, near, 14),
     ];
     // component c = 4 c2 + 2 c1 + c0: the first round splits by c0, the second by c1, the third by c2
     let (a0, b0) = unzip(r[0], r[1]);
@@ -184,14 +239,14 @@ pub fn gather<S: Simd>(simd: S, records: &[Record], list: &[u32; LANES]) -> Tran
 
 /// Two records in one vector.
 #[inline(always)]
-fn pair<S: Simd>(simd: S, records: &[Record], a: u32, b: u32) -> f32x16<S> {
-    row(simd, records, a).combine(row(simd, records, b))
+fn pair<S: Simd>(simd: S, near: Near, k: usize) -> f32x16<S> {
+    row(simd, near, k).combine(row(simd, near, k + 1))
 }
 
 #[inline(always)]
-fn row<S: Simd>(simd: S, records: &[Record], index: u32) -> f32x8<S> {
-    // SAFETY: `gather` compares all its indices with the length at once
-    let record = unsafe { records.get_unchecked(index as usize) };
+fn row<S: Simd>(simd: S, near: Near, k: usize) -> f32x8<S> {
+    // SAFETY: `Listed::new` has compared the indices with the number of these very records
+    let record = unsafe { near.records.get_unchecked(near.index[k] as usize) };
     f32x8::load_array_ref(simd, bytemuck::cast_ref::<Record, [f32; 8]>(record))
 }
 
@@ -212,7 +267,10 @@ mod tests {
             .map(|i| bytemuck::cast::<[f32; 8], Record>(std::array::from_fn(|c| (100 * i + c) as f32)))
             .collect();
         let list: [u32; LANES] = std::array::from_fn(|l| (l * 7 % 40) as u32);
-        let t = dispatch!(Level::new(), simd => gather(simd, &records, &list));
+        let t = dispatch!(Level::new(), simd => {
+            let listed = Listed::new(simd, &records, &list);
+            gather(simd, listed.run(0..LANES).next().unwrap())
+        });
         for (l, &j) in list.iter().enumerate() {
             let r = records[j as usize];
             assert_eq!([t.x[0][l], t.x[1][l], t.x[2][l]], r.x);

@@ -4,9 +4,11 @@
 //! remedy. Numbers have their unit, default and range in [`crate::params`]. Lengths are in metres, z points up.
 
 pub mod builtin;
+mod emitter;
 mod load;
 pub mod solid;
 
+pub use emitter::{Emitter, Outlet, Sink};
 pub use load::{Source, schema};
 
 use crate::laws::kernel::KernelSet;
@@ -46,6 +48,12 @@ pub struct Scene {
     /// Bodies that do not move: obstacles, terrain.
     #[serde(default, rename = "static", skip_serializing_if = "Vec::is_empty")]
     pub statics: Vec<Static>,
+    /// Sources of fluid.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub emitter: Vec<Emitter>,
+    /// Places where fluid vanishes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sink: Vec<Sink>,
     /// Fields that pull on everything.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub force: Vec<Force>,
@@ -113,6 +121,12 @@ pub struct Solver {
     /// How pressure is found.
     #[serde(default)]
     pub pressure: Pressure,
+    /// How density is found (E1).
+    #[serde(default)]
+    pub density: Density,
+    /// `delta` of density diffusion (E1), where density is integrated. 0 turns it off.
+    #[serde(default = "d::density_diffusion")]
+    pub density_diffusion: f64,
     /// Equation of state (E3).
     #[serde(default)]
     pub equation_of_state: EquationOfState,
@@ -140,6 +154,13 @@ pub struct Solver {
     /// XSPH (E6): how much particles are carried with their neighbours. 0 turns it off.
     #[serde(default = "d::xsph")]
     pub xsph: f64,
+    /// Shifting (Sun et al. 2017), as a multiple of theirs: inside a fluid, particles are carried from where they are
+    /// dense to where they are sparse. 0 turns it off.
+    #[serde(default = "d::shifting")]
+    pub shifting: f64,
+    /// Whether fluids slip along walls and bodies as if they had no viscosity there.
+    #[serde(default)]
+    pub walls_slip: bool,
     /// What acts between fluid and rigid bodies.
     #[serde(default)]
     pub coupling: Coupling,
@@ -185,6 +206,18 @@ pub enum Pressure {
     /// Weakly compressible SPH: pressure from density by an equation of state.
     #[default]
     Wcsph,
+}
+
+/// E1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Density {
+    /// Summed anew each step over the neighbours: cannot drift; a free surface looks thin to it.
+    #[default]
+    Summation,
+    /// Integrated from the divergence of the flow, with density diffusion (delta-SPH; Antuono et al. 2012): smooth
+    /// pressures, for gauges and waves.
+    Continuity,
 }
 
 /// E3.
@@ -294,8 +327,9 @@ pub struct Fluid {
     /// Name; `fluid` when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Where it stands at the beginning.
-    pub shape: Shape,
+    /// Where it stands at the beginning; absent for a fluid that only comes from emitters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Shape>,
     /// Rest density `rho_0`.
     #[serde(default = "d::fluid_density")]
     pub density: f64,
@@ -308,6 +342,9 @@ pub struct Fluid {
     /// How the particles stand at the beginning.
     #[serde(default)]
     pub start: Start,
+    /// How long a particle lives; for ever when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lifetime: Option<f64>,
 }
 
 /// How a fluid's particles stand at the beginning.
@@ -443,6 +480,17 @@ pub enum Shape {
         radius: f64,
         /// Length of the axis (m).
         height: f64,
+    },
+    /// A ring: the torus about `center` whose tube of radius `tube` runs at distance `radius` from the axis. 3D scenes only.
+    Torus {
+        /// Centre (m).
+        center: [f64; 3],
+        /// Direction of the axis.
+        axis: [f64; 3],
+        /// Radius of the ring (m).
+        radius: f64,
+        /// Radius of the tube (m).
+        tube: f64,
     },
     /// A triangle mesh: OBJ, STL, PLY, glTF or GLB. 3D scenes only.
     Mesh {
