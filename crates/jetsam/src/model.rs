@@ -3,8 +3,9 @@
 use crate::integrate::sources::{Drain, Source};
 use crate::interact::cells::Grid;
 use crate::laws::kernel::{Kernel, KernelSet};
-use crate::scene::{Force, Solver};
+use crate::scene::{Density, Force, Solver, Viscosity};
 use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
 
 /// Constants of a world.
 #[derive(Clone, Debug)]
@@ -84,6 +85,53 @@ impl Factors {
     }
 }
 
+/// Surface tension that a cohesion of strength 1 gives a flat, sharp surface: the work of parting two half spaces is
+/// `pi / 8 H^5 int c(s) s^4 ds` in 3D and `H^4 / 3 int c(s) s^3 ds` in 2D (after Fowler 1937).
+pub fn cohesion_moment(support: f64, dimensions: u32) -> f64 {
+    let power = dimensions as i32 + 1;
+    let factor = if dimensions == 2 { 1.0 / 3.0 } else { PI / 8.0 };
+    factor * support.powi(power + 1) * moment(power)
+}
+
+/// Surface tension that a curvature term of strength 1 gives (E7). In a fluid of even density the term is the gradient of a pair
+/// potential, the difference of `W` smeared over a ball of radius `H` and of `W` times the ball's volume: of such a potential
+/// `u` the surface tension is the mean of `|x| u` over all space, over `2 pi` in 2D and over 8 in 3D.
+pub fn curvature_moment(kernel: Kernel, support: f64, dimensions: u32) -> f64 {
+    const PARTS: u32 = 64;
+    let middles = || (0..PARTS).map(|k| (f64::from(k) + 0.5) / f64::from(PARTS));
+    let flat = dimensions == 2;
+    let (ball, shell) = if flat { (PI, 2.0 * PI) } else { (4.0 / 3.0 * PI, 4.0 * PI) };
+    let shell_at = |s: f64| shell * if flat { s } else { s * s } / f64::from(PARTS);
+    // mean of |x + y| over the directions of y, |x| = r and |y| = s
+    let apart = |r: f64, s: f64| {
+        let at = |cosine: f64| (r * r + s * s + 2.0 * r * s * cosine).max(0.0).sqrt();
+        middles().map(|t| if flat { at((PI * t).cos()) } else { at(2.0 * t - 1.0) }).sum::<f64>() / f64::from(PARTS)
+    };
+    let mut moment = 0.0;
+    for s in middles() {
+        let weight = kernel.value(s, 1.0, dimensions) * shell_at(s);
+        moment -= ball * weight * s;
+        moment += weight * middles().map(|r| shell_at(r) * apart(r, s)).sum::<f64>();
+    }
+    moment * support.powi(dimensions as i32 + 2) / if flat { 2.0 * PI } else { 8.0 }
+}
+
+/// Pressure that a cohesion of strength 1 puts on the inside of a fluid, by the virial: `2 pi / 3 H^4 int c(s) s^3 ds` in 3D,
+/// `pi / 2 H^3 int c(s) s^2 ds` in 2D.
+pub fn cohesion_pressure(support: f64, dimensions: u32) -> f64 {
+    let power = dimensions as i32;
+    let factor = if dimensions == 2 { 0.5 } else { 2.0 / 3.0 } * PI;
+    factor * support.powi(power + 1) * moment(power)
+}
+
+/// `int_0^1 c(s) s^power ds` of the cohesion's shape.
+fn moment(power: i32) -> f64 {
+    const PARTS: u32 = 1000;
+    let middle = |k: u32| (f64::from(k) + 0.5) / f64::from(PARTS);
+    let c = |s: f64| f64::from(crate::laws::fluid::cohesion_shape(s as f32));
+    (0..PARTS).map(middle).map(|s| c(s) * s.powi(power)).sum::<f64>() / f64::from(PARTS)
+}
+
 /// Constants of a fluid.
 #[derive(Clone, Debug)]
 pub struct FluidModel {
@@ -99,6 +147,10 @@ pub struct FluidModel {
     pub stiffness: f32,
     /// `alpha rho_0 c_0 h` (Pa s), E5.
     pub artificial: f32,
+    /// Strength of cohesion (N/m^(2d); E7).
+    pub cohesion: f32,
+    /// Strength of the curvature term (N/m^(2d); E7).
+    pub curvature: f32,
     /// How long a particle lives (s); infinite unless the scene says.
     pub lifetime: f64,
     /// `delta h c_0 / stiffness` (m^2/s/Pa), E1.
@@ -153,6 +205,17 @@ impl DtBound {
 }
 
 impl Model {
+    /// Whether the pairs of fluids have no laws but pressure and viscosity (E4, E5 without Mueller's form).
+    pub fn plain(&self) -> bool {
+        let s = &self.solver;
+        s.density == Density::Summation
+            && s.viscosity != Viscosity::Mueller
+            && s.xsph == 0.0
+            && s.shifting == 0.0
+            && s.vorticity == 0.0
+            && self.fluids.iter().all(|f| f.cohesion == 0.0 && f.curvature == 0.0)
+    }
+
     /// `1 / H`.
     pub fn inverse_support(&self) -> f32 {
         (1.0 / self.support) as f32
@@ -161,6 +224,11 @@ impl Model {
     /// `0.01 h^2`, `h = H / 2`: keeps viscosities finite for particles that meet (m^2).
     pub fn softening(&self) -> f32 {
         (0.01 * 0.25 * self.support * self.support) as f32
+    }
+
+    /// Whether colour gradients or vorticities are wanted (E7, E8).
+    pub fn wants_gradients(&self) -> bool {
+        self.fluids.iter().any(|f| f.curvature > 0.0) || self.solver.vorticity > 0.0
     }
 
     /// Gravity in single precision.

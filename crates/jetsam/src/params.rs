@@ -50,6 +50,8 @@ params! {
     artificial_viscosity: "solver.artificial_viscosity", "1", 0.05, 0.0, 10.0;
     xsph: "solver.xsph", "1", 0.0, 0.0, 1.0;
     shifting: "solver.shifting", "1", 0.0, 0.0, 5.0;
+    curvature: "solver.curvature", "1", 0.9, 0.0, 1.0;
+    vorticity: "solver.vorticity", "1/s", 0.0, 0.0, 1e3;
     density_diffusion: "solver.density_diffusion", "1", 0.1, 0.0, 1.0;
     dt: "solver.dt", "s", _, 1e-12, 1e3;
     courant: "solver.courant", "1", 0.4, 1e-3, 1.0;
@@ -60,6 +62,7 @@ params! {
     settle: "solver.settle", "s", 0.0, 0.0, 1e3;
     fluid_density: "fluid.density", "kg/m^3", 1000.0, 1e-6, 1e6;
     fluid_viscosity: "fluid.viscosity", "Pa s", 0.001, 0.0, 1e6;
+    fluid_surface_tension: "fluid.surface_tension", "N/m", 0.0, 0.0, 1e3;
     fluid_velocity: "fluid.velocity", "m/s", _, -1e5, 1e5;
     fluid_lifetime: "fluid.lifetime", "s", _, 1e-6, 1e6;
     emitter_start: "emitter.start", "s", 0.0, 0.0, 1e6;

@@ -18,6 +18,8 @@ pub enum Stage {
     Pressure,
     /// Pressures the fluid shows to the particles of bodies (E17).
     Boundary,
+    /// Colour gradients and vorticities, where surface tension or vorticity ask for them (E7, E8).
+    Gradients,
     /// Forces on every particle (E4-E6, E10-E12, E16, E30).
     Forces,
     /// Force and torque summed per body (E18).
@@ -30,13 +32,14 @@ pub enum Stage {
 
 impl Stage {
     /// The order of a step of weakly compressible SPH.
-    pub const WCSPH: [Stage; 10] = [
+    pub const WCSPH: [Stage; 11] = [
         Stage::Drift,
         Stage::Sources,
         Stage::Cells,
         Stage::Density,
         Stage::Pressure,
         Stage::Boundary,
+        Stage::Gradients,
         Stage::Forces,
         Stage::Bodies,
         Stage::Kick,
@@ -52,6 +55,7 @@ impl Stage {
             Stage::Density => "density",
             Stage::Pressure => "pressure",
             Stage::Boundary => "boundary",
+            Stage::Gradients => "gradients",
             Stage::Forces => "forces",
             Stage::Bodies => "bodies",
             Stage::Kick => "kick",

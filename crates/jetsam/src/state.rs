@@ -56,6 +56,11 @@ pub struct Particles {
     /// Velocity added by XSPH and shifting (m/s) and, last, `dD/dt` now (1/s), fluid only; empty when none of them is on.
     /// Written by forces.
     pub carry: Vec<[f32; 4]>,
+    /// Colour gradient times `H` and, last, `|curl v|` (1/s), fluid only; empty where neither is asked for. Written by gradients.
+    pub gradient: Vec<[f32; 4]>,
+    /// `curl v` (1/s), written by gradients; then the acceleration of vorticity confinement (m/s^2), written by forces.
+    /// Fluid only; empty as `gradient`.
+    pub vorticity: Vec<[f32; 3]>,
     /// When a particle was born (s), fluid only; empty where no fluid has a lifetime. Written by sources, permuted by cells.
     pub born: Vec<f32>,
     /// Fluid: identity, counted over all fluids from 0. Bodies: slot in [`Bodies`]. Permuted by cells.
@@ -116,6 +121,10 @@ impl Particles {
         self.density.resize(capacity, 1.0);
         if !self.born.is_empty() {
             self.born.resize(capacity, 0.0);
+        }
+        if !self.gradient.is_empty() {
+            self.gradient.resize(capacity, [0.0; 4]);
+            self.vorticity.resize(capacity, [0.0; 3]);
         }
         if !self.rate.is_empty() {
             self.rate.resize(capacity, [0.0; 2]);

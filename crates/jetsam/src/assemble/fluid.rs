@@ -5,7 +5,9 @@ use super::near::Near;
 use crate::error::Result;
 use crate::integrate::sources::Source;
 use crate::interact::cells::Grid;
-use crate::model::{ContactModel, DtBound, Factors, FluidModel, Model};
+use crate::model::{
+    ContactModel, DtBound, Factors, FluidModel, Model, cohesion_moment, cohesion_pressure, curvature_moment,
+};
 use crate::scene::{Coupling, EquationOfState, Scene, Start};
 use glam::DVec3;
 
@@ -80,6 +82,8 @@ impl Scene {
         let largest_speed = self.largest_speed(&fluid, bodies, &sources, gravity, &grid);
         let sound_speed = self.solver.sound_speed.unwrap_or(10.0 * largest_speed);
         self.squeeze(&mut fluid, gravity, sound_speed);
+        let cohesion = cohesion_moment(support, self.world.dimensions);
+        let curvature = curvature_moment(self.solver.kernel.force(), support, self.world.dimensions);
         let fluids: Vec<FluidModel> = self
             .fluid
             .iter()
@@ -90,6 +94,8 @@ impl Scene {
                 viscosity: f.viscosity as f32,
                 stiffness: (sound_speed * sound_speed * f.density) as f32,
                 artificial: (self.solver.artificial_viscosity * f.density * sound_speed * 0.5 * support) as f32,
+                cohesion: ((1.0 - self.solver.curvature) * f.surface_tension / cohesion) as f32,
+                curvature: (self.solver.curvature * f.surface_tension / curvature) as f32,
                 lifetime: f.lifetime.unwrap_or(f64::INFINITY),
                 diffusion: (self.solver.density_diffusion * 0.5 * support / (sound_speed * f.density)) as f32,
             })
@@ -179,6 +185,11 @@ impl Scene {
         }
         for f in &self.fluid {
             speed = speed.max(DVec3::from(f.velocity).length());
+            // cohesion squeezes a fluid: the speed that its pressure would drive it at
+            let (support, d) = (self.solver.support * self.resolution.spacing, self.world.dimensions);
+            let cohesion = (1.0 - self.solver.curvature) * f.surface_tension / cohesion_moment(support, d);
+            let pressure = cohesion * cohesion_pressure(support, d);
+            speed = speed.max((pressure / f.density).sqrt());
         }
         for source in sources {
             speed = speed.max(source.velocity.length());
@@ -241,6 +252,12 @@ impl Scene {
             if f.viscosity > 0.0 {
                 viscous = viscous.min(s.courant_viscous * model.support.powi(2) * f.density / (4.0 * f.viscosity));
             }
+        }
+        // capillary waves (Brackbill et al. 1992), in the same class as viscosity
+        for f in self.fluid.iter().filter(|f| f.surface_tension > 0.0) {
+            let wave =
+                (f.density * (0.5 * model.support).powi(3) / (2.0 * std::f64::consts::PI * f.surface_tension)).sqrt();
+            viscous = viscous.min(s.courant_force * wave);
         }
         let mut contact = f64::INFINITY;
         for a in 0..model.contacts.len() {

@@ -219,6 +219,8 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
         density: vec![1.0; room],
         rate: vec![[0.0; 2]; if integrated { room } else { 0 }],
         carry: vec![[0.0; 4]; if carried { room } else { 0 }],
+        gradient: vec![[0.0; 4]; if model.wants_gradients() { room } else { 0 }],
+        vorticity: vec![[0.0; 3]; if model.wants_gradients() { room } else { 0 }],
         born: vec![0.0; if mortal { room } else { 0 }],
         id: (0..room as u32).chain(0..bodies.record.len() as u32).collect(),
         owner: vec![0; room].into_iter().chain(bodies.owner.iter().copied()).collect(),

@@ -7,7 +7,7 @@ use super::Backend;
 use crate::integrate::{Advance, bodies, particles, sources};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::neighbours::{Around, NeighbourChunk, Places, with_scratch};
-use crate::interact::{CHUNK, boundary, density, forces, pressure};
+use crate::interact::{CHUNK, boundary, density, forces, gradients, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
 use crate::scene::Density;
@@ -110,6 +110,7 @@ impl Backend for Cpu {
             Stage::Density => self.density(model),
             Stage::Pressure => self.pressure(model),
             Stage::Boundary => self.boundary(model),
+            Stage::Gradients => self.gradients(model),
             Stage::Forces => {
                 self.forces(model, advance);
                 self.held = sources::hold(&mut self.state.particles, model);
@@ -369,27 +370,58 @@ impl Cpu {
         }
     }
 
+    fn gradients(&mut self, model: &Model) {
+        let p = &mut self.state.particles;
+        if p.gradient.is_empty() {
+            return;
+        }
+        let (records, owner, level) = (&p.record, &p.owner, self.level);
+        let n = p.count[Kind::Fluid as usize];
+        chunks_mut!(p.gradient, ..n)
+            .zip(chunks_mut!(p.vorticity, ..n))
+            .zip(&self.neighbours[Kind::Fluid as usize])
+            .enumerate()
+            .for_each(|(c, ((gradient, vorticity), chunk))| {
+                dispatch!(level, simd => {
+                    gradients::chunk(simd, model, records, owner, c * CHUNK, chunk, gradient, vorticity);
+                });
+            });
+    }
+
     fn forces(&mut self, model: &Model, advance: Advance) {
         let p = &mut self.state.particles;
         let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
-        let (mirror, dt, fastest) = (&self.mirror[..], advance.dt as f32, self.ledger.speed as f32);
+        let (mirror, gradient) = (&self.mirror[..], &p.gradient[..]);
+        let (dt, fastest) = (advance.dt as f32, self.ledger.speed as f32);
         for kind in Kind::ALL {
             let first = p.first[kind as usize];
             let segment = first..first + p.count[kind as usize];
             let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
-            let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut [[f32; 4]]| {
+            let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut _, vorticity: &mut _| {
                 if !chunk.found && kind == Kind::Static {
                     return push.fill([0.0; 3]);
                 }
                 let first = first + c * CHUNK;
-                let input = forces::Input { model, records, mirror, owner, first, particle_mass, dt, fastest };
-                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry));
+                let input =
+                    forces::Input { model, records, mirror, gradient, owner, first, particle_mass, dt, fastest };
+                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry, vorticity));
             };
-            if kind == Kind::Fluid && !p.carry.is_empty() {
-                let carry = p.carry.par_chunks_mut(CHUNK);
-                chunks.zip(carry).for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry));
-            } else {
-                chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut []));
+            let fluid = kind == Kind::Fluid;
+            match (fluid && !p.carry.is_empty(), fluid && !gradient.is_empty()) {
+                (true, true) => {
+                    let (carry, vorticity) = (p.carry.par_chunks_mut(CHUNK), p.vorticity.par_chunks_mut(CHUNK));
+                    let all = chunks.zip(carry).zip(vorticity);
+                    all.for_each(|(((c, (push, chunk)), carry), vorticity)| work(c, push, chunk, carry, vorticity));
+                }
+                (true, false) => {
+                    let all = chunks.zip(p.carry.par_chunks_mut(CHUNK));
+                    all.for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry, &mut []));
+                }
+                (false, true) => {
+                    let all = chunks.zip(p.vorticity.par_chunks_mut(CHUNK));
+                    all.for_each(|((c, (push, chunk)), vorticity)| work(c, push, chunk, &mut [], vorticity));
+                }
+                (false, false) => chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut [], &mut [])),
             }
         }
     }
@@ -439,7 +471,8 @@ impl Cpu {
                 records: &p.record[range.clone()],
                 push: &p.push[range.clone()],
                 density: &p.density[range.clone()],
-                owner: &p.owner[range],
+                owner: &p.owner[range.clone()],
+                confined: p.vorticity.get(range).filter(|_| model.solver.vorticity > 0.0),
                 neighbours: &neighbours[c],
             };
             part.tally(model, sum);
@@ -507,6 +540,7 @@ struct Part<'a> {
     push: &'a [[f32; 3]],
     density: &'a [f32],
     owner: &'a [u32],
+    confined: Option<&'a [[f32; 3]]>,
     neighbours: &'a NeighbourChunk,
 }
 
@@ -528,6 +562,9 @@ impl Part<'_> {
             let mut outside = model.gravity;
             if !model.fields.is_empty() {
                 outside += forces::fields(model, r).as_dvec3();
+            }
+            if let Some(confined) = self.confined {
+                outside += DVec3::from(confined[k].map(f64::from));
             }
             sum.external_force += mass * outside;
             sum.kinetic += 0.5 * mass * speed * speed;

@@ -1,8 +1,9 @@
-//! Stage `forces`: every law of pairs, evaluated from both ends of each pair (E4-E6, E10-E12, E16, E17, E30).
+//! Stage `forces`: every law of pairs, evaluated from both ends of each pair (E4-E8, E10-E12, E16, E17, E30).
 //!
 //! In: neighbour runs, records with pressure shares. Out: `push`, an acceleration (m/s^2) for fluids and a force
 //! (N) for the particles of bodies; `carry` for XSPH, shifting and the rate of density. Sums over SPH pairs are in [`super::pairs`], contacts here.
 
+use super::gradients::confinement;
 use super::lanes::{LANES, Listed};
 use super::neighbours::{NeighbourChunk, Runs};
 use super::pairs::{Ends, Pairs, Terms, wrap};
@@ -22,6 +23,8 @@ pub struct Input<'a> {
     pub records: &'a [Record],
     /// Velocities that bodies' particles show to viscosity (m/s); empty where they show their own.
     pub mirror: &'a [[f32; 4]],
+    /// Colour gradients and vorticities of fluids; empty where they are not asked for.
+    pub gradient: &'a [[f32; 4]],
     /// Owners of all particles.
     pub owner: &'a [u32],
     /// First index of the chunk.
@@ -43,15 +46,39 @@ pub fn chunk<S: Simd>(
     chunk: &NeighbourChunk,
     push: &mut [[f32; 3]],
     carry: &mut [[f32; 4]],
+    vorticity: &mut [[f32; 3]],
+) {
+    // most scenes ask for no more than pressure and viscosity: the rest is then not even compiled in
+    if input.model.plain() && input.mirror.is_empty() {
+        particles::<S, true>(simd, input, kind, chunk, push, carry, vorticity);
+    } else {
+        particles::<S, false>(simd, input, kind, chunk, push, carry, vorticity);
+    }
+}
+
+#[inline(always)]
+fn particles<S: Simd, const PLAIN: bool>(
+    simd: S,
+    input: Input,
+    kind: Kind,
+    chunk: &NeighbourChunk,
+    push: &mut [[f32; 3]],
+    carry: &mut [[f32; 4]],
+    vorticity: &mut [[f32; 3]],
 ) {
     let listed = Listed::new(simd, input.records, chunk.list());
     for (k, runs) in chunk.runs.iter().enumerate() {
         let i = input.first + k;
         if kind != Kind::Fluid {
-            push[k] = on_body(simd, &input, kind, listed, runs, i).to_array();
+            push[k] = on_body::<S, PLAIN>(simd, &input, kind, listed, runs, i).to_array();
             continue;
         }
-        let (pairs, total) = on_fluid(simd, &input, listed, runs, i);
+        let (pairs, mut total) = on_fluid::<S, PLAIN>(simd, &input, listed, runs, i);
+        if input.model.solver.vorticity > 0.0 {
+            let confined = confinement(input.model, pairs.growth(simd), Vec3::from(vorticity[k]));
+            total += confined;
+            vorticity[k] = confined.to_array();
+        }
         push[k] = total.to_array();
         if let Some(carry) = carry.get_mut(k) {
             let [x, y, z] = pairs.carry(simd, input.fastest).to_array();
@@ -62,14 +89,26 @@ pub fn chunk<S: Simd>(
 
 /// Sums over the pairs of a fluid particle, and its acceleration.
 #[inline(always)]
-fn on_fluid<'a, S: Simd>(simd: S, input: &Input<'a>, listed: Listed<'a>, runs: &Runs, i: usize) -> (Pairs<'a>, Vec3) {
+fn on_fluid<'a, S: Simd, const PLAIN: bool>(
+    simd: S,
+    input: &Input<'a>,
+    listed: Listed<'a>,
+    runs: &Runs,
+    i: usize,
+) -> (Pairs<'a>, Vec3) {
     let model = input.model;
     let own = &input.records[i];
     let owner = input.owner[i];
     let me = &model.fluids[owner as usize];
-    let mut pairs = Pairs::new(model, input.records, input.mirror, i, Some(owner));
+    let mut pairs = Pairs::new(input, i, Some(owner));
     let run = |kind| listed.run(runs.padded(kind));
-    let mut terms = Terms { mu_sum: [2.0 * me.viscosity; LANES], eta: [me.artificial; LANES], same: [1.0; LANES] };
+    let mut terms = Terms {
+        mu_sum: [2.0 * me.viscosity; LANES],
+        eta: [me.artificial; LANES],
+        same: [1.0; LANES],
+        cohesion: me.cohesion,
+        curvature: me.curvature,
+    };
     for near in run(Kind::Fluid) {
         if model.fluids.len() > 1 {
             for l in 0..LANES {
@@ -80,17 +119,17 @@ fn on_fluid<'a, S: Simd>(simd: S, input: &Input<'a>, listed: Listed<'a>, runs: &
                 terms.eta[l] = 0.5 * (me.artificial + other.artificial);
             }
         }
-        pairs.add(simd, near, Ends::Fluids, &terms);
+        pairs.add::<S, PLAIN>(simd, near, Ends::Fluids, &terms);
     }
     // walls: the fluid's own viscosity acts (unless they are free of it), the artificial one does not
     let mu = if model.solver.walls_slip { 0.0 } else { 2.0 * me.viscosity };
-    let terms = Terms { mu_sum: [mu; LANES], eta: [0.0; LANES], same: [0.0; LANES] };
+    let terms = Terms { mu_sum: [mu; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
     for near in run(Kind::Static) {
-        pairs.add(simd, near, Ends::OnFluid, &terms);
+        pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
     }
     if model.solver.coupling == Coupling::Pressure {
         for near in run(Kind::Rigid) {
-            pairs.add(simd, near, Ends::OnFluid, &terms);
+            pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
         }
     }
     let mut contacts = Vec3::ZERO;
@@ -106,14 +145,22 @@ fn on_fluid<'a, S: Simd>(simd: S, input: &Input<'a>, listed: Listed<'a>, runs: &
 
 /// Force on a particle of a body.
 #[inline(always)]
-fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, listed: Listed, runs: &Runs, i: usize) -> Vec3 {
+fn on_body<S: Simd, const PLAIN: bool>(
+    simd: S,
+    input: &Input,
+    kind: Kind,
+    listed: Listed,
+    runs: &Runs,
+    i: usize,
+) -> Vec3 {
     let model = input.model;
     let own = &input.records[i];
     let owner = input.owner[i];
     let mut force = Vec3::ZERO;
     if kind == Kind::Static || model.solver.coupling == Coupling::Pressure {
-        let mut pairs = Pairs::new(model, input.records, input.mirror, i, None);
-        let mut terms = Terms { mu_sum: [0.0; LANES], eta: [0.0; LANES], same: [0.0; LANES] };
+        let mut pairs = Pairs::new(input, i, None);
+        let mut terms =
+            Terms { mu_sum: [0.0; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
         for near in listed.run(runs.padded(Kind::Fluid)) {
             if !model.solver.walls_slip {
                 for l in 0..LANES {
@@ -122,7 +169,7 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, listed: Listed, runs: &R
                     terms.mu_sum[l] = model.fluids.get(fluid as usize).map_or(0.0, |f| 2.0 * f.viscosity);
                 }
             }
-            pairs.add(simd, near, Ends::OnBody, &terms);
+            pairs.add::<S, PLAIN>(simd, near, Ends::OnBody, &terms);
         }
         force += pairs.force(simd);
     }

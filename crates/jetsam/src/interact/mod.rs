@@ -6,6 +6,7 @@ pub mod boundary;
 pub mod cells;
 pub mod density;
 pub mod forces;
+pub mod gradients;
 pub mod lanes;
 pub mod neighbours;
 pub mod pairs;

@@ -1,9 +1,10 @@
 //! Sums over the SPH pairs of one particle, sixteen neighbours at a time: E4, E5, and where they are asked for the
-//! rate of density (E1), XSPH (E6) and shifting.
+//! rate of density (E1), XSPH (E6), surface tension (E7), the growth of vorticity (E8) and shifting.
 //!
 //! In: a particle, lists of neighbours, records. Out: force, rate, velocity it is carried by. Called by [`super::forces`].
 
 use super::density::weights;
+use super::forces::Input;
 use super::lanes::{LANES, Lanes, Near, gather, minus, squares, sum};
 use crate::laws::fluid;
 use crate::laws::kernel::{Kernel, each_kernel};
@@ -69,6 +70,10 @@ pub struct Terms {
     pub eta: Lanes,
     /// 1 where both are of one fluid, else 0.
     pub same: Lanes,
+    /// Strength of cohesion (N/m^(2d)); 0 between fluids and towards bodies.
+    pub cohesion: f32,
+    /// Strength of the curvature term, alike.
+    pub curvature: f32,
 }
 
 /// Sixteen pairs, lane by lane.
@@ -86,6 +91,7 @@ struct Sixteen<'a> {
 pub struct Pairs<'a> {
     model: &'a Model,
     mirror: &'a [[f32; 4]],
+    gradient: &'a [[f32; 4]],
     i: u32,
     own: &'a Record,
     kernel: Kernel,
@@ -102,6 +108,7 @@ pub struct Pairs<'a> {
     carry: [Lanes; 3],
     drive: [Lanes; 3],
     full: Lanes,
+    growth: [Lanes; 3],
 }
 
 /// Constants of density diffusion for the fluid of one particle.
@@ -113,10 +120,10 @@ struct Diffusion {
 }
 
 impl<'a> Pairs<'a> {
-    /// Sums for particle `i`, of fluid `fluid` if it is fluid. `mirror` holds the velocities that bodies' particles show to
-    /// viscosity, and is empty where they show their own.
+    /// Sums for particle `i`, of fluid `fluid` if it is fluid.
     #[inline(always)]
-    pub fn new(model: &'a Model, records: &'a [Record], mirror: &'a [[f32; 4]], i: usize, fluid: Option<u32>) -> Self {
+    pub fn new(input: &Input<'a>, i: usize, fluid: Option<u32>) -> Self {
+        let Input { model, records, mirror, gradient, .. } = *input;
         let solver = &model.solver;
         let continuity = fluid.filter(|_| solver.density == Density::Continuity).map(|f| {
             let f = &model.fluids[f as usize];
@@ -125,6 +132,7 @@ impl<'a> Pairs<'a> {
         Self {
             model,
             mirror,
+            gradient,
             i: i as u32,
             own: &records[i],
             kernel: model.kernel.force(),
@@ -141,22 +149,26 @@ impl<'a> Pairs<'a> {
             carry: [[0.0; LANES]; 3],
             drive: [[0.0; LANES]; 3],
             full: [0.0; LANES],
+            growth: [[0.0; LANES]; 3],
         }
     }
 
-    /// Adds sixteen neighbours.
+    /// Adds sixteen neighbours. `PLAIN`: nothing but E4 and E5 is asked for.
     #[inline(always)]
-    pub fn add<S: Simd>(&mut self, simd: S, near: Near, ends: Ends, terms: &Terms) {
+    pub fn add<S: Simd, const PLAIN: bool>(&mut self, simd: S, near: Near, ends: Ends, terms: &Terms) {
         let other = gather(simd, near);
         let (d, r_sq) = wrap_lanes(simd, self.model, self.own.x, &other.x);
         let mut v = [[0.0; LANES]; 3];
         for a in 0..3 {
             v[a] = minus(simd, &other.v[a], self.own.v[a]);
         }
-        let mirrored = ends != Ends::Fluids && !self.mirror.is_empty();
+        let mirrored = !PLAIN && ends != Ends::Fluids && !self.mirror.is_empty();
         let seen = if mirrored { self.slipless(near.index, ends, &other.v) } else { v };
         let pairs = Sixteen { volume: &other.volume, share: &other.share, d: &d, r_sq: &r_sq, v: &v, seen: &seen };
-        let g = each_kernel!(self.kernel, K => self.add_forces(K, &pairs, terms));
+        let g = each_kernel!(self.kernel, K => self.add_forces::<PLAIN>(K, &pairs, terms));
+        if PLAIN {
+            return;
+        }
         if let Some(factor) = self.mueller {
             for l in 0..LANES {
                 let volumes = self.own.volume * other.volume[l];
@@ -170,6 +182,17 @@ impl<'a> Pairs<'a> {
         if let Some(diffusion) = self.continuity {
             self.add_rate(ends, &pairs, &g, terms, diffusion);
         }
+        if ends == Ends::Fluids && terms.cohesion + terms.curvature > 0.0 {
+            self.add_tension(near.index, terms, &pairs);
+        }
+        if ends == Ends::Fluids && self.model.solver.vorticity > 0.0 {
+            for l in 0..LANES {
+                let slope = -g[l] * other.volume[l] * self.gradient[near.index[l] as usize][3];
+                for a in 0..3 {
+                    self.growth[a][l] += slope * d[a][l];
+                }
+            }
+        }
         if self.xsph && ends == Ends::Fluids || self.shift {
             self.add_carry(near.index, ends, &pairs, &g);
         }
@@ -178,10 +201,10 @@ impl<'a> Pairs<'a> {
     /// E4 and E5; returns `G`. All in one loop over the lanes, a copy for each kernel: of short loops, and of choices
     /// inside, the compiler makes scalars.
     #[inline(always)]
-    fn add_forces(&mut self, kernel: Kernel, pairs: &Sixteen, terms: &Terms) -> Lanes {
+    fn add_forces<const PLAIN: bool>(&mut self, kernel: Kernel, pairs: &Sixteen, terms: &Terms) -> Lanes {
         let Sixteen { volume, share, d, r_sq, v, seen } = pairs;
         let (own, own_share) = (self.own, self.own.share.max(self.floor));
-        let laminar = if self.mueller.is_some() { 0.0 } else { 1.0 };
+        let laminar = if !PLAIN && self.mueller.is_some() { 0.0 } else { 1.0 };
         let mut out = [0.0; LANES];
         for l in 0..LANES {
             let g = self.g_factor * kernel.g(r_sq[l].sqrt() * self.inverse);
@@ -216,6 +239,31 @@ impl<'a> Pairs<'a> {
             let rate = rate * terms.same[l];
             self.rate[l] +=
                 fluid::density_diffusion(volume[l], self.own.share, share[l], weight, rate, stiffness, g[l]);
+        }
+    }
+
+    /// E7: cohesion and curvature.
+    #[inline(always)]
+    fn add_tension(&mut self, list: &[u32; LANES], terms: &Terms, pairs: &Sixteen) {
+        let Sixteen { d, r_sq, .. } = pairs;
+        let volumes = self.own.volume * self.own.volume; // of one fluid, all alike
+        for l in 0..LANES {
+            let r = r_sq[l].sqrt();
+            let along_d = fluid::cohesion(volumes, terms.cohesion * terms.same[l], r * self.inverse, r);
+            for a in 0..3 {
+                self.force[a][l] += along_d * d[a][l];
+            }
+        }
+        if terms.curvature == 0.0 {
+            return;
+        }
+        let own = self.gradient[self.i as usize];
+        for l in 0..LANES {
+            let factor = fluid::curvature(volumes, terms.curvature * terms.same[l]);
+            let other = self.gradient[list[l] as usize];
+            for a in 0..3 {
+                self.force[a][l] += factor * (other[a] - own[a]);
+            }
         }
     }
 
@@ -268,6 +316,12 @@ impl<'a> Pairs<'a> {
             }
         }
         v
+    }
+
+    /// Where vorticity grows.
+    #[inline(always)]
+    pub fn growth<S: Simd>(&self, simd: S) -> Vec3 {
+        Vec3::new(sum(simd, &self.growth[0]), sum(simd, &self.growth[1]), sum(simd, &self.growth[2]))
     }
 
     /// Sum of the forces (N).

@@ -78,9 +78,19 @@ fn shifting(V_j: f32, W: f32, W_dx: f32, reach: f32, G: f32) -> f32 {
   return reach * V_j * (1.0 + 0.2 * q_sq * q_sq) * G;
 }
 
-// E7, cohesion (Akinci et al. 2013): shape of their C(r), attractive between H/2 and H, repulsive below; zero beyond.
+// E7, cohesion (Akinci et al. 2013, eq. 2): shape of the attraction of a pair, repulsive when close; zero beyond s = 1.
 fn cohesion_shape(s: f32) -> f32 {
   let t = max(1.0 - s, 0.0);
   let a = t * t * t * s * s * s;
   return select(2.0 * a - 0.015625, a, s > 0.5);
+}
+
+// E7, cohesion: factor of d_ij. strength = surface tension over the moment of the shape (N/m^d per m^d).
+fn cohesion(volumes: f32, strength: f32, s: f32, r: f32) -> f32 {
+  return volumes * strength * cohesion_shape(s) / max(r, 1e-12);
+}
+
+// E7, curvature (Akinci et al. 2013, eq. 5): factor of n_j - n_i, the colour gradients times H.
+fn curvature(volumes: f32, strength: f32) -> f32 {
+  return volumes * strength;
 }

@@ -158,6 +158,13 @@ pub struct Solver {
     /// dense to where they are sparse. 0 turns it off.
     #[serde(default = "d::shifting")]
     pub shifting: f64,
+    /// Part of the surface tension that the curvature term carries, the rest is cohesion's (E7). Cohesion alone lets drops freeze
+    /// before they are round; the curvature term alone does not hold threads together.
+    #[serde(default = "d::curvature")]
+    pub curvature: f64,
+    /// Vorticity confinement (E8): gives back swirl that is lost to viscosity between particles. 0 turns it off.
+    #[serde(default = "d::vorticity")]
+    pub vorticity: f64,
     /// Whether fluids slip along walls and bodies as if they had no viscosity there.
     #[serde(default)]
     pub walls_slip: bool,
@@ -336,6 +343,9 @@ pub struct Fluid {
     /// Dynamic viscosity `mu`.
     #[serde(default = "d::fluid_viscosity")]
     pub viscosity: f64,
+    /// Surface tension against the air (E7). 0 turns it off.
+    #[serde(default = "d::fluid_surface_tension")]
+    pub surface_tension: f64,
     /// Velocity at the beginning.
     #[serde(default)]
     pub velocity: [f64; 3],
