@@ -4,7 +4,7 @@ use crate::flock::FlockConstants;
 use crate::integrate::sources::{Drain, Source};
 use crate::interact::cells::Grid;
 use crate::laws::kernel::{Kernel, KernelSet};
-use crate::scene::{Force, Solver};
+use crate::scene::{Density, Force, Solver, Viscosity};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -211,6 +211,17 @@ impl DtBound {
 }
 
 impl Model {
+    /// Whether the pairs of fluids have no laws but pressure and viscosity (E4, E5 without Mueller's form).
+    pub fn plain(&self) -> bool {
+        let s = &self.solver;
+        s.density == Density::Summation
+            && s.viscosity != Viscosity::Mueller
+            && s.xsph == 0.0
+            && s.shifting == 0.0
+            && s.vorticity == 0.0
+            && self.fluids.iter().all(|f| f.cohesion == 0.0 && f.curvature == 0.0)
+    }
+
     /// `1 / H`.
     pub fn inverse_support(&self) -> f32 {
         (1.0 / self.support) as f32

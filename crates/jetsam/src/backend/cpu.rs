@@ -7,7 +7,7 @@ use super::Backend;
 use crate::flock::{Crowd, Surroundings};
 use crate::integrate::{Advance, bodies, particles, sources};
 use crate::interact::cells::{Cells, Grid};
-use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
+use crate::interact::neighbours::{Around, NeighbourChunk, Places, with_scratch};
 use crate::interact::{CHUNK, boundary, density, forces, gradients, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
@@ -27,6 +27,7 @@ pub struct Cpu {
     neighbours: [Vec<NeighbourChunk>; Kind::COUNT],
     /// The other half of the double buffers of `cells`.
     spare: Spare,
+    places: Places,
     /// Where the particle of each rigid or static slot stands.
     place: Vec<AtomicU32>,
     share: Vec<f32>,
@@ -64,6 +65,7 @@ impl Default for Cpu {
             cells: Default::default(),
             neighbours: Default::default(),
             spare: Spare::default(),
+            places: Places::default(),
             place: Vec::new(),
             share: Vec::new(),
             mirror: Vec::new(),
@@ -96,6 +98,7 @@ impl Backend for Cpu {
             born: p.born.clone(),
         };
         self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
+        self.places = Places::new(p.record.len());
         self.share = vec![0.0; state.particles.record.len()];
         self.parts = bodies::parts(&state.bodies.body);
         self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
@@ -188,6 +191,7 @@ impl Cpu {
             self.spare.density.resize(p.density.len(), 1.0);
             self.spare.rate.resize(p.rate.len(), [0.0; 2]);
             self.spare.born.resize(p.born.len(), 0.0);
+            self.places = Places::new(total);
             self.share.resize(total, 0.0);
             self.static_copies = 0;
         }
@@ -210,15 +214,18 @@ impl Cpu {
         std::mem::swap(&mut p.id, &mut from.id);
         std::mem::swap(&mut p.owner, &mut from.owner);
         let n = fluid.len();
+        let [x, y, z] = &mut self.places.x;
         chunks_mut!(p.record, ..n)
             .zip(chunks_mut!(p.push_before, ..n))
             .zip(chunks_mut!(p.id, ..n))
             .zip(chunks_mut!(p.owner, ..n))
+            .zip(chunks_mut!(x, ..n).zip(chunks_mut!(y, ..n)).zip(chunks_mut!(z, ..n)))
             .zip(cells.order[..n].par_chunks(CHUNK))
-            .for_each(|((((record, push), id), owner), order)| {
+            .for_each(|(((((record, push), id), owner), ((x, y), z)), order)| {
                 for (k, place) in order.iter().enumerate() {
                     let place = place.load(Relaxed) as usize;
                     record[k] = from.record[place];
+                    [x[k], y[k], z[k]] = record[k].x;
                     push[k] = p.push[place];
                     id[k] = from.id[place];
                     owner[k] = from.owner[place];
@@ -255,6 +262,7 @@ impl Cpu {
         // static particles stay where they are: once into each half of the double buffer
         if self.static_copies < 2 {
             self.copy_bodies(grid, Kind::Static);
+            self.cells[Kind::Static as usize].map(grid);
             self.static_copies += 1;
         }
     }
@@ -272,15 +280,18 @@ impl Cpu {
         let range = range.start..range.start + slots.len();
         p.count[kind as usize] = inside;
         let (order, place, base) = (&cells.order, &self.place, range.start);
+        let [x, y, z] = &mut self.places.x;
         chunks_mut!(p.record, range.clone())
             .zip(chunks_mut!(p.id, range.clone()))
-            .zip(chunks_mut!(p.owner, range))
+            .zip(chunks_mut!(p.owner, range.clone()))
+            .zip(chunks_mut!(x, range.clone()).zip(chunks_mut!(y, range.clone())).zip(chunks_mut!(z, range)))
             .zip(order[..slots.len()].par_chunks(CHUNK))
             .enumerate()
-            .for_each(|(c, (((record, id), owner), order))| {
+            .for_each(|(c, ((((record, id), owner), ((x, y), z)), order))| {
                 for (k, from) in order.iter().enumerate() {
                     let slot = slots.start + from.load(Relaxed) as usize;
                     record[k] = b.record[slot];
+                    [x[k], y[k], z[k]] = record[k].x;
                     id[k] = slot as u32;
                     owner[k] = b.owner[slot];
                     let at = c * CHUNK + k;
@@ -294,6 +305,7 @@ impl Cpu {
         let around = Around {
             grid: &model.grid,
             records: &p.record,
+            places: &self.places,
             owner: &p.owner,
             cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
             first: p.first,
@@ -346,6 +358,10 @@ impl Cpu {
             let (records, owner, first) = (&p.record, &p.owner, segment.start);
             let neighbours = &self.neighbours[kind as usize];
             let work = |c: usize, share: &mut [f32], chunk: &NeighbourChunk, mirror: &mut [[f32; 4]]| {
+                if !chunk.found {
+                    share.fill(0.0);
+                    return mirror.fill([0.0; 4]);
+                }
                 dispatch!(level, simd => {
                     boundary::chunk(simd, model, records, owner, first + c * CHUNK, chunk, share, mirror);
                 });
@@ -391,6 +407,9 @@ impl Cpu {
             let segment = first..first + p.count[kind as usize];
             let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
             let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut _, vorticity: &mut _| {
+                if !chunk.found && kind == Kind::Static {
+                    return push.fill([0.0; 3]);
+                }
                 let first = first + c * CHUNK;
                 let input =
                     forces::Input { model, records, mirror, gradient, owner, first, particle_mass, dt, fastest };

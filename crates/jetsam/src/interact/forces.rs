@@ -4,7 +4,7 @@
 //! (N) for the particles of bodies; `carry` for XSPH, shifting and the rate of density. Sums over SPH pairs are in [`super::pairs`], contacts here.
 
 use super::gradients::confinement;
-use super::lanes::LANES;
+use super::lanes::{LANES, Listed};
 use super::neighbours::{NeighbourChunk, Runs};
 use super::pairs::{Ends, Pairs, Terms, wrap};
 use crate::laws::{contact, field};
@@ -48,13 +48,32 @@ pub fn chunk<S: Simd>(
     carry: &mut [[f32; 4]],
     vorticity: &mut [[f32; 3]],
 ) {
+    // most scenes ask for no more than pressure and viscosity: the rest is then not even compiled in
+    if input.model.plain() && input.mirror.is_empty() {
+        particles::<S, true>(simd, input, kind, chunk, push, carry, vorticity);
+    } else {
+        particles::<S, false>(simd, input, kind, chunk, push, carry, vorticity);
+    }
+}
+
+#[inline(always)]
+fn particles<S: Simd, const PLAIN: bool>(
+    simd: S,
+    input: Input,
+    kind: Kind,
+    chunk: &NeighbourChunk,
+    push: &mut [[f32; 3]],
+    carry: &mut [[f32; 4]],
+    vorticity: &mut [[f32; 3]],
+) {
+    let listed = Listed::new(simd, input.records, chunk.list());
     for (k, runs) in chunk.runs.iter().enumerate() {
         let i = input.first + k;
         if kind != Kind::Fluid {
-            push[k] = on_body(simd, &input, kind, chunk, runs, i).to_array();
+            push[k] = on_body::<S, PLAIN>(simd, &input, kind, listed, runs, i).to_array();
             continue;
         }
-        let (pairs, mut total) = on_fluid(simd, &input, chunk, runs, i);
+        let (pairs, mut total) = on_fluid::<S, PLAIN>(simd, &input, listed, runs, i);
         if input.model.solver.vorticity > 0.0 {
             let confined = confinement(input.model, pairs.growth(simd), Vec3::from(vorticity[k]));
             total += confined;
@@ -70,10 +89,10 @@ pub fn chunk<S: Simd>(
 
 /// Sums over the pairs of a fluid particle, and its acceleration.
 #[inline(always)]
-fn on_fluid<'a, S: Simd>(
+fn on_fluid<'a, S: Simd, const PLAIN: bool>(
     simd: S,
     input: &Input<'a>,
-    chunk: &NeighbourChunk,
+    listed: Listed<'a>,
     runs: &Runs,
     i: usize,
 ) -> (Pairs<'a>, Vec3) {
@@ -82,7 +101,7 @@ fn on_fluid<'a, S: Simd>(
     let owner = input.owner[i];
     let me = &model.fluids[owner as usize];
     let mut pairs = Pairs::new(input, i, Some(owner));
-    let run = |kind| chunk.list[runs.padded(kind)].as_chunks::<LANES>().0;
+    let run = |kind| listed.run(runs.padded(kind));
     let mut terms = Terms {
         mu_sum: [2.0 * me.viscosity; LANES],
         eta: [me.artificial; LANES],
@@ -90,33 +109,33 @@ fn on_fluid<'a, S: Simd>(
         cohesion: me.cohesion,
         curvature: me.curvature,
     };
-    for list in run(Kind::Fluid) {
+    for near in run(Kind::Fluid) {
         if model.fluids.len() > 1 {
             for l in 0..LANES {
-                let other = input.owner[list[l] as usize];
+                let other = input.owner[near.index[l] as usize];
                 terms.same[l] = if other == owner { 1.0 } else { 0.0 };
                 let other = &model.fluids[other as usize];
                 terms.mu_sum[l] = me.viscosity + other.viscosity;
                 terms.eta[l] = 0.5 * (me.artificial + other.artificial);
             }
         }
-        pairs.add(simd, list, Ends::Fluids, &terms);
+        pairs.add::<S, PLAIN>(simd, near, Ends::Fluids, &terms);
     }
     // walls: the fluid's own viscosity acts (unless they are free of it), the artificial one does not
     let mu = if model.solver.walls_slip { 0.0 } else { 2.0 * me.viscosity };
     let terms = Terms { mu_sum: [mu; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
-    for list in run(Kind::Static) {
-        pairs.add(simd, list, Ends::OnFluid, &terms);
+    for near in run(Kind::Static) {
+        pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
     }
     if model.solver.coupling == Coupling::Pressure {
-        for list in run(Kind::Rigid) {
-            pairs.add(simd, list, Ends::OnFluid, &terms);
+        for near in run(Kind::Rigid) {
+            pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
         }
     }
     let mut contacts = Vec3::ZERO;
     for kind in [Kind::Rigid, Kind::Static] {
         if springs(model, kind, own) {
-            let list = &chunk.list[runs.exact(kind)];
+            let list = listed.indices(runs.exact(kind));
             contacts += sum_contacts(input, own, list, |(_, body)| Some(model.coupling_pair(owner, body)));
         }
     }
@@ -126,7 +145,14 @@ fn on_fluid<'a, S: Simd>(
 
 /// Force on a particle of a body.
 #[inline(always)]
-fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, runs: &Runs, i: usize) -> Vec3 {
+fn on_body<S: Simd, const PLAIN: bool>(
+    simd: S,
+    input: &Input,
+    kind: Kind,
+    listed: Listed,
+    runs: &Runs,
+    i: usize,
+) -> Vec3 {
     let model = input.model;
     let own = &input.records[i];
     let owner = input.owner[i];
@@ -135,24 +161,24 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, 
         let mut pairs = Pairs::new(input, i, None);
         let mut terms =
             Terms { mu_sum: [0.0; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
-        for list in chunk.list[runs.padded(Kind::Fluid)].as_chunks::<LANES>().0 {
+        for near in listed.run(runs.padded(Kind::Fluid)) {
             if !model.solver.walls_slip {
                 for l in 0..LANES {
                     // padding names the particle itself, whose owner is a body
-                    let fluid = if model.fluids.len() == 1 { 0 } else { input.owner[list[l] as usize] };
+                    let fluid = if model.fluids.len() == 1 { 0 } else { input.owner[near.index[l] as usize] };
                     terms.mu_sum[l] = model.fluids.get(fluid as usize).map_or(0.0, |f| 2.0 * f.viscosity);
                 }
             }
-            pairs.add(simd, list, Ends::OnBody, &terms);
+            pairs.add::<S, PLAIN>(simd, near, Ends::OnBody, &terms);
         }
         force += pairs.force(simd);
     }
-    let fluids = &chunk.list[runs.exact(Kind::Fluid)];
+    let fluids = listed.indices(runs.exact(Kind::Fluid));
     force += sum_contacts(input, own, fluids, |(other, fluid)| {
         springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
     });
     for other in [Kind::Rigid, Kind::Static] {
-        let list = &chunk.list[runs.exact(other)];
+        let list = listed.indices(runs.exact(other));
         force += sum_contacts(input, own, list, |(_, body)| Some(model.contact_pair(owner, body)));
     }
     if kind == Kind::Rigid {

@@ -3,10 +3,10 @@
 //! In: neighbour runs, records. Out: `[n_x, n_y, n_z, |omega|]`, `n = H sum_j V_j grad_i W_ij` over its own fluid, and
 //! `omega = curl v`.
 
-use super::density::each_lane;
-use super::lanes::{LANES, Lanes, gather, sum};
+use super::lanes::{LANES, Lanes, Listed, gather, sum};
 use super::neighbours::NeighbourChunk;
 use super::pairs::wrap_lanes;
+use crate::laws::kernel::each_kernel;
 use crate::model::Model;
 use crate::state::{Kind, Record};
 use fearless_simd::Simd;
@@ -26,26 +26,18 @@ pub fn chunk<S: Simd>(
     vorticity: &mut [[f32; 3]],
 ) {
     let inverse = model.inverse_support();
+    let listed = Listed::new(simd, records, chunk.list());
     for (k, runs) in chunk.runs.iter().enumerate() {
         let own = &records[first + k];
         let (mut color, mut curl): ([Lanes; 3], [Lanes; 3]) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-        for list in chunk.list[runs.padded(Kind::Fluid)].as_chunks::<LANES>().0 {
-            let other = gather(simd, records, list);
-            let (d, r_sq) = wrap_lanes(model, own.x, &other.x);
-            let mut s = [0.0; LANES];
-            for l in 0..LANES {
-                s[l] = r_sq[l].sqrt() * inverse;
-            }
-            let g = each_lane(
-                model.kernel.force(),
-                &s,
-                #[inline(always)]
-                |k, s| k.g(s),
-            );
-            for l in 0..LANES {
+        for near in listed.run(runs.padded(Kind::Fluid)) {
+            let other = gather(simd, near);
+            let (d, r_sq) = wrap_lanes(simd, model, own.x, &other.x);
+            let same = near.index.map(|j| if owner[j as usize] == owner[first + k] { 1.0 } else { 0.0 });
+            each_kernel!(model.kernel.force(), K => for l in 0..LANES {
                 // grad_i W = -G d_ij
-                let slope = -model.factors.g * g[l] * other.volume[l];
-                let same = if owner[list[l] as usize] == owner[first + k] { slope } else { 0.0 };
+                let slope = -model.factors.g * K.g(r_sq[l].sqrt() * inverse) * other.volume[l];
+                let same = same[l] * slope;
                 let [v_x, v_y, v_z] = [0, 1, 2].map(|a| other.v[a][l] - own.v[a]);
                 for a in 0..3 {
                     color[a][l] += same * d[a][l];
@@ -53,7 +45,7 @@ pub fn chunk<S: Simd>(
                 curl[0][l] += slope * (d[1][l] * v_z - d[2][l] * v_y);
                 curl[1][l] += slope * (d[2][l] * v_x - d[0][l] * v_z);
                 curl[2][l] += slope * (d[0][l] * v_y - d[1][l] * v_x);
-            }
+            });
         }
         let [x, y, z] = color.map(|c| model.support as f32 * sum(simd, &c));
         let omega = Vec3::from(curl.map(|c| sum(simd, &c)));

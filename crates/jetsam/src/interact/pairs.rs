@@ -3,10 +3,11 @@
 //!
 //! In: a particle, lists of neighbours, records. Out: force, rate, velocity it is carried by. Called by [`super::forces`].
 
-use super::density::{each_lane, weights};
+use super::density::weights;
 use super::forces::Input;
-use super::lanes::{LANES, Lanes, gather, sum};
-use crate::laws::{fluid, kernel::Kernel};
+use super::lanes::{LANES, Lanes, Near, gather, minus, squares, sum};
+use crate::laws::fluid;
+use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
 use crate::scene::{Density, Viscosity};
 use crate::state::Record;
@@ -35,12 +36,10 @@ fn shortest(d: f32, period: f32) -> f32 {
 
 /// `d_ij` and its square for sixteen neighbours, by the shortest way on periodic axes.
 #[inline(always)]
-pub fn wrap_lanes(model: &Model, x: [f32; 3], other: &[Lanes; 3]) -> ([Lanes; 3], Lanes) {
+pub fn wrap_lanes<S: Simd>(simd: S, model: &Model, x: [f32; 3], other: &[Lanes; 3]) -> ([Lanes; 3], Lanes) {
     let mut d = [[0.0; LANES]; 3];
     for a in 0..3 {
-        for l in 0..LANES {
-            d[a][l] = other[a][l] - x[a];
-        }
+        d[a] = minus(simd, &other[a], x[a]);
         let period = model.grid.period[a];
         if period > 0.0 {
             for l in 0..LANES {
@@ -48,10 +47,7 @@ pub fn wrap_lanes(model: &Model, x: [f32; 3], other: &[Lanes; 3]) -> ([Lanes; 3]
             }
         }
     }
-    let mut r_sq = [0.0; LANES];
-    for l in 0..LANES {
-        r_sq[l] = d[0][l] * d[0][l] + d[1][l] * d[1][l] + d[2][l] * d[2][l];
-    }
+    let r_sq = squares(simd, &d);
     (d, r_sq)
 }
 
@@ -80,15 +76,26 @@ pub struct Terms {
     pub curvature: f32,
 }
 
+/// Sixteen pairs, lane by lane.
+struct Sixteen<'a> {
+    volume: &'a Lanes,
+    share: &'a Lanes,
+    d: &'a [Lanes; 3],
+    r_sq: &'a Lanes,
+    v: &'a [Lanes; 3],
+    /// Relative velocities that viscosity sees.
+    seen: &'a [Lanes; 3],
+}
+
 /// The sums of one particle.
 pub struct Pairs<'a> {
     model: &'a Model,
-    records: &'a [Record],
     mirror: &'a [[f32; 4]],
     gradient: &'a [[f32; 4]],
     i: u32,
     own: &'a Record,
     kernel: Kernel,
+    g_factor: f32,
     inverse: f32,
     softening: f32,
     floor: f32,
@@ -124,12 +131,12 @@ impl<'a> Pairs<'a> {
         });
         Self {
             model,
-            records,
             mirror,
             gradient,
             i: i as u32,
             own: &records[i],
             kernel: model.kernel.force(),
+            g_factor: model.factors.g,
             inverse: model.inverse_support(),
             softening: model.softening(),
             floor: if solver.negative_pressure { f32::NEG_INFINITY } else { 0.0 },
@@ -146,93 +153,82 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// Adds sixteen neighbours.
+    /// Adds sixteen neighbours. `PLAIN`: nothing but E4 and E5 is asked for.
     #[inline(always)]
-    pub fn add<S: Simd>(&mut self, simd: S, list: &[u32; LANES], ends: Ends, terms: &Terms) {
-        let own = self.own;
-        let other = gather(simd, self.records, list);
-        let (d, r_sq) = wrap_lanes(self.model, own.x, &other.x);
+    pub fn add<S: Simd, const PLAIN: bool>(&mut self, simd: S, near: Near, ends: Ends, terms: &Terms) {
+        let other = gather(simd, near);
+        let (d, r_sq) = wrap_lanes(simd, self.model, self.own.x, &other.x);
         let mut v = [[0.0; LANES]; 3];
         for a in 0..3 {
-            for l in 0..LANES {
-                v[a][l] = other.v[a][l] - own.v[a];
-            }
+            v[a] = minus(simd, &other.v[a], self.own.v[a]);
         }
-        let mut s = [0.0; LANES];
-        for l in 0..LANES {
-            s[l] = r_sq[l].sqrt() * self.inverse;
-        }
-        let mut g = each_lane(
-            self.kernel,
-            &s,
-            #[inline(always)]
-            |k, s| k.g(s),
-        );
-        let (mut along_d, mut along_v, mut v_dot_d) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        let own_share = own.share.max(self.floor);
-        for l in 0..LANES {
-            g[l] *= self.model.factors.g;
-            let volumes = own.volume * other.volume[l];
-            v_dot_d[l] = v[0][l] * d[0][l] + v[1][l] * d[1][l] + v[2][l] * d[2][l];
-            along_d[l] = fluid::pressure_force(volumes, own_share, other.share[l].max(self.floor), g[l])
-                + fluid::viscosity_artificial(volumes, terms.eta[l], v_dot_d[l], r_sq[l], self.softening, g[l]);
-            along_v[l] = fluid::viscosity_laminar(volumes, terms.mu_sum[l], r_sq[l], self.softening, g[l]);
+        let mirrored = !PLAIN && ends != Ends::Fluids && !self.mirror.is_empty();
+        let seen = if mirrored { self.slipless(near.index, ends, &other.v) } else { v };
+        let pairs = Sixteen { volume: &other.volume, share: &other.share, d: &d, r_sq: &r_sq, v: &v, seen: &seen };
+        let g = each_kernel!(self.kernel, K => self.add_forces::<PLAIN>(K, &pairs, terms));
+        if PLAIN {
+            return;
         }
         if let Some(factor) = self.mueller {
-            let laplacian = each_lane(
-                Kernel::Viscosity,
-                &s,
-                #[inline(always)]
-                |k, s| k.g(s),
-            );
             for l in 0..LANES {
-                let volumes = own.volume * other.volume[l];
-                along_v[l] = fluid::viscosity_mueller(volumes, terms.mu_sum[l], factor * laplacian[l]);
+                let volumes = self.own.volume * other.volume[l];
+                let laplacian = Kernel::Viscosity.g(r_sq[l].sqrt() * self.inverse);
+                let along_v = fluid::viscosity_mueller(volumes, terms.mu_sum[l], factor * laplacian);
+                for a in 0..3 {
+                    self.force[a][l] += along_v * seen[a][l];
+                }
             }
         }
         if let Some(diffusion) = self.continuity {
-            self.add_rate(ends, &other.volume, &other.share, &d, &v_dot_d, &g, terms, diffusion);
+            self.add_rate(ends, &pairs, &g, terms, diffusion);
         }
         if ends == Ends::Fluids && terms.cohesion + terms.curvature > 0.0 {
-            self.add_tension(list, terms, &s, &r_sq, &mut along_d);
+            self.add_tension(near.index, terms, &pairs);
         }
         if ends == Ends::Fluids && self.model.solver.vorticity > 0.0 {
             for l in 0..LANES {
-                let slope = -g[l] * other.volume[l] * self.gradient[list[l] as usize][3];
+                let slope = -g[l] * other.volume[l] * self.gradient[near.index[l] as usize][3];
                 for a in 0..3 {
                     self.growth[a][l] += slope * d[a][l];
                 }
             }
         }
         if self.xsph && ends == Ends::Fluids || self.shift {
-            self.add_carry(list, ends, &other.volume, &d, &v, &r_sq, &g);
+            self.add_carry(near.index, ends, &pairs, &g);
         }
-        if ends != Ends::Fluids && !self.mirror.is_empty() {
-            v = self.slipless(list, ends, &other.v);
+    }
+
+    /// E4 and E5; returns `G`. All in one loop over the lanes, a copy for each kernel: of short loops, and of choices
+    /// inside, the compiler makes scalars.
+    #[inline(always)]
+    fn add_forces<const PLAIN: bool>(&mut self, kernel: Kernel, pairs: &Sixteen, terms: &Terms) -> Lanes {
+        let Sixteen { volume, share, d, r_sq, v, seen } = pairs;
+        let (own, own_share) = (self.own, self.own.share.max(self.floor));
+        let laminar = if !PLAIN && self.mueller.is_some() { 0.0 } else { 1.0 };
+        let mut out = [0.0; LANES];
+        for l in 0..LANES {
+            let g = self.g_factor * kernel.g(r_sq[l].sqrt() * self.inverse);
+            let volumes = own.volume * volume[l];
+            let v_dot_d = v[0][l] * d[0][l] + v[1][l] * d[1][l] + v[2][l] * d[2][l];
+            let inverse_sq = fluid::softened_inverse(r_sq[l], self.softening);
+            let along_d = fluid::pressure_force(volumes, own_share, share[l].max(self.floor), g)
+                + fluid::viscosity_artificial(volumes, terms.eta[l], v_dot_d, inverse_sq, g);
+            let along_v = fluid::viscosity_laminar(volumes, laminar * terms.mu_sum[l], r_sq[l], inverse_sq, g);
+            self.force[0][l] += along_d * d[0][l] + along_v * seen[0][l];
+            self.force[1][l] += along_d * d[1][l] + along_v * seen[1][l];
+            self.force[2][l] += along_d * d[2][l] + along_v * seen[2][l];
+            out[l] = g;
         }
-        for a in 0..3 {
-            for l in 0..LANES {
-                self.force[a][l] += along_d[l] * d[a][l] + along_v[l] * v[a][l];
-            }
-        }
+        out
     }
 
     /// E1, the rate of density.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)] // one caller
-    fn add_rate(
-        &mut self,
-        ends: Ends,
-        volume: &Lanes,
-        share: &Lanes,
-        d: &[Lanes; 3],
-        v_dot_d: &Lanes,
-        g: &Lanes,
-        terms: &Terms,
-        diffusion: Diffusion,
-    ) {
+    fn add_rate(&mut self, ends: Ends, pairs: &Sixteen, g: &Lanes, terms: &Terms, diffusion: Diffusion) {
+        let Sixteen { volume, share, d, v, .. } = pairs;
         for l in 0..LANES {
-            self.rate[l] += fluid::density_rate(volume[l], v_dot_d[l], g[l]);
+            let v_dot_d = v[0][l] * d[0][l] + v[1][l] * d[1][l] + v[2][l] * d[2][l];
+            self.rate[l] += fluid::density_rate(volume[l], v_dot_d, g[l]);
         }
         if ends != Ends::Fluids {
             return;
@@ -246,12 +242,17 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// E7: cohesion into `along_d`, curvature into the force.
+    /// E7: cohesion and curvature.
     #[inline(always)]
-    fn add_tension(&mut self, list: &[u32; LANES], terms: &Terms, s: &Lanes, r_sq: &Lanes, along_d: &mut Lanes) {
+    fn add_tension(&mut self, list: &[u32; LANES], terms: &Terms, pairs: &Sixteen) {
+        let Sixteen { d, r_sq, .. } = pairs;
         let volumes = self.own.volume * self.own.volume; // of one fluid, all alike
         for l in 0..LANES {
-            along_d[l] += fluid::cohesion(volumes, terms.cohesion * terms.same[l], s[l], r_sq[l].sqrt());
+            let r = r_sq[l].sqrt();
+            let along_d = fluid::cohesion(volumes, terms.cohesion * terms.same[l], r * self.inverse, r);
+            for a in 0..3 {
+                self.force[a][l] += along_d * d[a][l];
+            }
         }
         if terms.curvature == 0.0 {
             return;
@@ -268,17 +269,8 @@ impl<'a> Pairs<'a> {
 
     /// E6, and the sums of shifting.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)] // one caller
-    fn add_carry(
-        &mut self,
-        list: &[u32; LANES],
-        ends: Ends,
-        volume: &Lanes,
-        d: &[Lanes; 3],
-        v: &[Lanes; 3],
-        r_sq: &Lanes,
-        g: &Lanes,
-    ) {
+    fn add_carry(&mut self, list: &[u32; LANES], ends: Ends, pairs: &Sixteen, g: &Lanes) {
+        let Sixteen { volume, d, r_sq, v, .. } = pairs;
         let model = self.model;
         let mut w = weights(model.kernel.density(), self.inverse, r_sq);
         for l in 0..LANES {

@@ -38,15 +38,20 @@ fn pressure_force(volumes: f32, share_i: f32, share_j: f32, G: f32) -> f32 {
   return volumes * (share_i + share_j) * G;
 }
 
+// E5: 1 / (r^2 + softening), softening = 0.01 h^2; once for both viscosities.
+fn softened_inverse(r_sq: f32, softening: f32) -> f32 {
+  return 1.0 / (r_sq + softening);
+}
+
 // E5, artificial (Monaghan 1992), only for approaching pairs: factor of d_ij.
-// eta = alpha rho_0 c_0 h (Pa s), softening = 0.01 h^2.
-fn viscosity_artificial(volumes: f32, eta: f32, v_dot_d: f32, r_sq: f32, softening: f32, G: f32) -> f32 {
-  return -volumes * eta * min(v_dot_d, 0.0) / (r_sq + softening) * G;
+// eta = alpha rho_0 c_0 h (Pa s), inverse_sq = 1 / (r^2 + softening).
+fn viscosity_artificial(volumes: f32, eta: f32, v_dot_d: f32, inverse_sq: f32, G: f32) -> f32 {
+  return -volumes * eta * min(v_dot_d, 0.0) * inverse_sq * G;
 }
 
 // E5, laminar (Morris et al. 1997): factor of v_ij. mu_sum = mu_i + mu_j (Pa s).
-fn viscosity_laminar(volumes: f32, mu_sum: f32, r_sq: f32, softening: f32, G: f32) -> f32 {
-  return -volumes * mu_sum * G * r_sq / (r_sq + softening);
+fn viscosity_laminar(volumes: f32, mu_sum: f32, r_sq: f32, inverse_sq: f32, G: f32) -> f32 {
+  return -volumes * mu_sum * G * (r_sq * inverse_sq);
 }
 
 // E5, Mueller et al. 2003: factor of v_ij. laplacian = nabla^2 W_ij of the viscosity kernel.

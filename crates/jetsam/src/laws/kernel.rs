@@ -67,6 +67,23 @@ impl KernelSet {
     }
 }
 
+/// The same code for each kernel, `$k` a constant in it: the choice is made outside of loops, for inside it keeps the
+/// compiler from wide instructions.
+macro_rules! each_kernel {
+    ($kernel:expr, $k:ident => $body:expr) => {
+        each_kernel!($kernel, $k => $body; Cubic WendlandC2 WendlandC4 Quintic Poly6 Spiky Viscosity)
+    };
+    ($kernel:expr, $k:ident => $body:expr; $($name:ident)*) => {
+        match $kernel {
+            $($crate::laws::kernel::Kernel::$name => {
+                const $k: $crate::laws::kernel::Kernel = $crate::laws::kernel::Kernel::$name;
+                $body
+            })*
+        }
+    };
+}
+pub(crate) use each_kernel;
+
 impl Kernel {
     /// Every kernel there is.
     pub const ALL: [Kernel; 7] =
