@@ -2,8 +2,10 @@
 
 use crate::interact::cells::Grid;
 use crate::laws::kernel::{Kernel, KernelSet};
+use crate::scene::joint::JointModel;
+use crate::scene::motion::{Path, Shake};
 use crate::scene::{Force, Solver};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Constants of a world.
 #[derive(Clone, Debug)]
@@ -32,6 +34,12 @@ pub struct Model {
     pub gravity: DVec3,
     /// Fields besides gravity (E30).
     pub fields: Vec<Force>,
+    /// Shaking of the scene, felt with gravity.
+    pub shakes: Vec<Shake>,
+    /// Joints of bodies, in the order of the scene.
+    pub joints: Vec<JointModel>,
+    /// Script of each body that has one (E15).
+    pub paths: Vec<Option<Path>>,
     /// The box particles live in and its cells.
     pub grid: Grid,
     /// Contact diameter `r` (m).
@@ -96,6 +104,12 @@ pub struct ContactModel {
     pub ln_restitution: f32,
     /// Number of simultaneous contacts for which stiffness and damping are shared out.
     pub shared_by: f32,
+    /// Most particles in one layer: as many contacts share a load at most.
+    pub face: f32,
+    /// Friction, or negative where the other body's counts (E13).
+    pub friction: f32,
+    /// Bodies it does not touch, for a joint holds them together.
+    pub joined: Vec<u32>,
     /// Stated spring constant (N/m), or 0.
     pub stiffness: f32,
     /// Stated dashpot (N s/m), or negative.
@@ -114,6 +128,8 @@ pub enum DtBound {
     Viscosity,
     /// A twentieth of a contact.
     Contact,
+    /// The fastest body moves a tenth of the contact diameter.
+    Travel,
     /// The scene's own `dt`.
     Scene,
     /// The end of a frame.
@@ -128,11 +144,17 @@ impl DtBound {
             DtBound::Force => "force",
             DtBound::Viscosity => "viscosity",
             DtBound::Contact => "contact",
+            DtBound::Travel => "travel",
             DtBound::Scene => "scene",
             DtBound::Frame => "frame",
         }
     }
 }
+
+/// Tangential over normal spring of a contact: both then last equally long for a ball (Schaefer, Dippel and Wolf 1996).
+const TANGENTIAL: f32 = 2.0 / 7.0;
+/// Damping ratio of the tangential spring (E13).
+const TANGENTIAL_DAMPING: f32 = 0.3;
 
 impl Model {
     /// `1 / H`.
@@ -145,9 +167,47 @@ impl Model {
         (0.01 * 0.25 * self.support * self.support) as f32
     }
 
-    /// Gravity in single precision.
-    pub fn gravity_f32(&self) -> Vec3 {
-        self.gravity.as_vec3()
+    /// Gravity at a time (s), with what shaking adds (m/s^2).
+    pub fn gravity_at(&self, time: f64) -> DVec3 {
+        self.shakes.iter().fold(self.gravity, |g, shake| g + shake.felt(time))
+    }
+
+    /// Whether forces move a body.
+    #[inline]
+    pub fn moves(&self, body: u32) -> bool {
+        self.contacts[body as usize].inverse_mass > 0.0
+    }
+
+    /// Whether two bodies pass through each other: none of them moves by forces, or a joint holds them together.
+    #[inline]
+    pub fn apart(&self, a: u32, b: u32) -> bool {
+        !(self.moves(a) || self.moves(b)) || self.contacts[a as usize].joined.contains(&b)
+    }
+
+    /// Dashpot (N s/m) that takes the speed of approach of bodies `a` and `b` within a step if as many contacts as a
+    /// face has particles share it, and never more (E12).
+    #[inline]
+    pub fn stop(&self, a: u32, b: u32, dt: f32) -> f32 {
+        let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
+        let mass = 1.0 / (a.inverse_mass + b.inverse_mass);
+        if dt > 0.0 { mass / (dt * a.face.max(b.face)) } else { 0.0 }
+    }
+
+    /// Tangential spring (N/m), its dashpot (N s/m) and friction of one contact of bodies `a` and `b` with the normal
+    /// spring `k` times `part` (E13). Symmetric to the last bit.
+    #[inline]
+    pub fn friction_pair(&self, a: u32, b: u32, k: f32, part: f32) -> (f32, f32, f32) {
+        let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
+        let mu = match (a.friction < 0.0, b.friction < 0.0) {
+            (true, _) => b.friction,
+            (_, true) => a.friction,
+            _ => (a.friction * b.friction).sqrt(),
+        };
+        let mass = 1.0 / (a.inverse_mass + b.inverse_mass);
+        let shared_by = a.shared_by.max(b.shared_by);
+        let k_t = TANGENTIAL * k;
+        let eta_t = part * crate::laws::contact::dashpot(TANGENTIAL_DAMPING, k_t / part * shared_by, mass) / shared_by;
+        (k_t, eta_t, mu)
     }
 
     /// Spring constant (N/m) and dashpot (N s/m) of one contact between particles of bodies `a` and `b` (E14).

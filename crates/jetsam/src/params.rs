@@ -66,6 +66,15 @@ params! {
     rigid_restitution: "rigid.restitution", "1", 0.3, 0.001, 1.0;
     rigid_stiffness: "rigid.stiffness", "N/m", _, 1e-9, 1e15;
     rigid_damping: "rigid.damping", "N s/m", _, 0.0, 1e12;
+    rigid_friction: "rigid.friction", "1", 0.4, 0.0, 10.0;
+    static_friction: "static.friction", "1", _, 0.0, 10.0;
+    motion_velocity: "static.motion.translation.velocity", "m/s", _, -1e5, 1e5;
+    motion_rate: "static.motion.rotation.rate", "rad/s", _, -1e5, 1e5;
+    motion_period: "static.motion.oscillation.period", "s", _, 1e-6, 1e9;
+    shake_period: "force.shake.period", "s", _, 1e-6, 1e9;
+    joint_stiffness: "joint.stiffness", "N/m", 1000.0, 0.0, 1e15;
+    joint_damping: "joint.damping", "N s/m", _, 0.0, 1e12;
+    joint_length: "joint.length", "m", _, 0.0, 1e6;
     fov: "camera.fov", "degrees", 35.0, 1.0, 170.0;
 }
 

@@ -51,6 +51,9 @@ pub enum Trouble {
 /// A step shorter than this fraction of the step at rest means that time stands still.
 const STALLED: f64 = 1e-4;
 
+/// A body moves no further in a step than this fraction of the contact diameter: contacts see it coming.
+const TRAVEL: f64 = 0.1;
+
 /// Momentum against the impulse from outside (E12, C9): what is missing is the residual.
 #[derive(Clone, Copy, Debug, Default)]
 struct MomentumLedger {
@@ -95,7 +98,7 @@ impl World {
     /// One step, no longer than `longest` (s).
     pub fn step(&mut self, longest: f64) -> StepReport {
         let (dt, bound) = self.next_dt(longest);
-        let advance = Advance { dt, drag: 0.0 };
+        let advance = Advance { dt, time: self.time + dt, drag: 0.0 };
         for (stage, timer) in Stage::WCSPH.into_iter().zip(&mut self.timers) {
             let start = Instant::now();
             self.backend.run(stage, &self.model, advance);
@@ -124,7 +127,11 @@ impl World {
     /// Length of the next step and what bounds it (E29).
     fn next_dt(&self, longest: f64) -> (f64, DtBound) {
         let ledger = self.backend.ledger();
-        let (dt, bound) = self.model.largest_dt(ledger.speed, ledger.acceleration);
+        let (mut dt, mut bound) = self.model.largest_dt(ledger.speed, ledger.acceleration);
+        let travel = TRAVEL * self.model.contact_diameter / ledger.body_speed;
+        if travel < dt && self.model.solver.dt.is_none() {
+            (dt, bound) = (travel, DtBound::Travel);
+        }
         if dt >= longest {
             return (longest, DtBound::Frame);
         }
@@ -156,7 +163,7 @@ impl World {
         while time < end {
             let (dt, _) = self.next_dt(end - time);
             for stage in Stage::WCSPH {
-                self.backend.run(stage, &self.model, Advance { dt, drag });
+                self.backend.run(stage, &self.model, Advance { dt, drag, time: 0.0 });
             }
             time += dt;
         }
@@ -169,6 +176,7 @@ impl World {
             None => self.bound_by.push((bound, 1)),
         }
         self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force);
+        self.momentum.impulse += ledger.external_impulse;
         self.momentum.force = ledger.external_force;
         let (at_rest, _) = self.model.largest_dt(0.0, 0.0);
         let trouble = if ledger.nonfinite > 0 || !dt.is_finite() {

@@ -4,14 +4,15 @@
 //! are made in their order: the same bits for any number of threads.
 
 use super::Backend;
-use crate::integrate::{Advance, bodies, particles};
+use crate::integrate::{Advance, bodies, joints, particles};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
+use crate::interact::contacts::Surfaces;
 use crate::interact::{CHUNK, boundary, density, forces, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
 use crate::stage::Stage;
-use crate::state::{Kind, Record, State};
+use crate::state::{Kind, Record, State, Touch};
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -30,6 +31,8 @@ pub struct Cpu {
     share: Vec<f32>,
     parts: Vec<bodies::Part>,
     particle_mass: Vec<f32>,
+    /// Angular velocity of each body (rad/s), for contacts.
+    spin: Vec<[f32; 3]>,
     sums: Vec<Ledger>,
     ledger: Ledger,
     static_copies: u32,
@@ -55,6 +58,7 @@ impl Default for Cpu {
             share: Vec::new(),
             parts: Vec::new(),
             particle_mass: Vec::new(),
+            spin: Vec::new(),
             sums: Vec::new(),
             ledger: Ledger::default(),
             static_copies: 0,
@@ -85,11 +89,11 @@ impl Backend for Cpu {
             Stage::Cells => self.sort(&model.grid),
             Stage::Density => self.density(model),
             Stage::Pressure => self.pressure(model),
-            Stage::Boundary => self.boundary(model),
+            Stage::Boundary => self.boundary(model, advance),
             Stage::Forces => self.forces(model, advance),
-            Stage::Bodies => self.bodies(model),
+            Stage::Bodies => self.bodies(model, advance),
             Stage::Kick => self.kick(model, advance),
-            Stage::Ledger => self.tally(model),
+            Stage::Ledger => self.tally(model, advance),
         }
     }
 
@@ -124,6 +128,12 @@ impl Cpu {
             },
         );
         if advance.drag == 0.0 {
+            let paths = model.paths.par_iter().with_min_len(CHUNK);
+            b.body.par_iter_mut().zip(paths).for_each(|(body, path)| match path {
+                Some(path) => bodies::script(body, path, advance.time),
+                None => bodies::half_kick(body, model, advance.dt),
+            });
+            joints::drift(b, model, advance.dt);
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::drift(body, model, advance.dt));
             bodies::follow(b, model);
         }
@@ -243,16 +253,16 @@ impl Cpu {
             .for_each(|((records, density), owner)| pressure::chunk(model, records, density, owner));
     }
 
-    fn boundary(&mut self, model: &Model) {
-        let p = &mut self.state.particles;
-        let level = self.level;
+    fn boundary(&mut self, model: &Model, advance: Advance) {
+        let State { particles: p, bodies: b } = &mut self.state;
+        let (level, gravity) = (self.level, model.gravity_at(advance.time).as_vec3());
         for kind in [Kind::Rigid, Kind::Static] {
             let segment = p.segment(kind);
             let (records, owner, first) = (&p.record, &p.owner, segment.start);
             chunks_mut!(self.share, segment.clone()).zip(&self.neighbours[kind as usize]).enumerate().for_each(
                 |(c, (share, chunk))| {
                     dispatch!(level, simd => {
-                        boundary::chunk(simd, model, records, owner, first + c * CHUNK, chunk, share);
+                        boundary::chunk(simd, model, records, owner, &b.body, gravity, first + c * CHUNK, chunk, share);
                     });
                 },
             );
@@ -263,34 +273,56 @@ impl Cpu {
     }
 
     fn forces(&mut self, model: &Model, advance: Advance) {
-        let p = &mut self.state.particles;
+        let State { particles: p, bodies: b } = &mut self.state;
         let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
+        self.spin.clear();
+        self.spin.extend(b.body.iter().map(|b| b.omega.as_vec3().to_array()));
+        let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slip: &b.slip, spin: &self.spin };
+        let (gravity, dt) = (model.gravity_at(advance.time).as_vec3(), advance.dt as f32);
+        let bodies_first = p.first[Kind::Rigid as usize];
         for kind in Kind::ALL {
             let first = p.first[kind as usize];
             let segment = first..first + p.count[kind as usize];
             let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
-            let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut [[f32; 3]]| {
-                let (first, dt) = (first + c * CHUNK, advance.dt as f32);
-                let input = forces::Input { model, records, owner, first, particle_mass, dt };
-                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry));
+            let work = |c: usize,
+                        push: &mut [[f32; 3]],
+                        chunk: &NeighbourChunk,
+                        carry: &mut [[f32; 3]],
+                        touch: &mut [Touch]| {
+                let first = first + c * CHUNK;
+                let input = forces::Input { model, records, owner, first, particle_mass, surfaces, gravity, dt };
+                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry, touch));
             };
-            if kind == Kind::Fluid && !p.carry.is_empty() {
+            if kind != Kind::Fluid {
+                let touch = p.touch[first - bodies_first..].par_chunks_mut(CHUNK);
+                chunks.zip(touch).for_each(|((c, (push, chunk)), touch)| work(c, push, chunk, &mut [], touch));
+            } else if !p.carry.is_empty() {
                 let carry = p.carry.par_chunks_mut(CHUNK);
-                chunks.zip(carry).for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry));
+                chunks.zip(carry).for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry, &mut []));
             } else {
-                chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut []));
+                chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut [], &mut []));
             }
         }
     }
 
-    fn bodies(&mut self, model: &Model) {
+    fn bodies(&mut self, model: &Model, advance: Advance) {
         let State { particles: p, bodies: b } = &mut self.state;
-        let (place, push) = (&self.place, &p.push);
-        let force = |slot: usize| match place[slot].load(Relaxed) {
-            GONE => [0.0; 3],
-            at => push[at as usize],
+        let (place, push, touch, first) = (&self.place, &p.push, &p.touch, p.first[Kind::Rigid as usize]);
+        let felt = |slot: usize| match place[slot].load(Relaxed) {
+            GONE => None,
+            at => Some((&push[at as usize], &touch[at as usize - first])),
         };
-        bodies::sum(b, &mut self.parts, force, model);
+        let before: Vec<bool> = b.body.iter().map(|b| b.deep).collect();
+        bodies::sum(b, &mut self.parts, felt, model.gravity_at(advance.time), model.dimensions);
+        joints::springs(b, model);
+        for (body, before) in b.body.iter_mut().zip(before) {
+            let far = body.contacts > 0 && body.v.length() * advance.dt > 0.5 * model.contact_diameter;
+            body.deep |= far && !body.is_static();
+            self.ledger.fast_contacts += u64::from(body.deep && !before && !body.is_static());
+        }
+        b.slip[..b.rigid_slots].par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(slot, slip)| {
+            *slip = felt(slot).map_or([0.0; 3], |(_, touch)| touch.slip);
+        });
     }
 
     fn kick(&mut self, model: &Model, advance: Advance) {
@@ -305,10 +337,12 @@ impl Cpu {
             });
         if advance.drag == 0.0 {
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::kick(body, integrator, advance.dt));
+            joints::kick(b, model);
         }
     }
 
-    fn tally(&mut self, model: &Model) {
+    fn tally(&mut self, model: &Model, advance: Advance) {
+        let gravity = model.gravity_at(advance.time);
         let State { particles: p, bodies: b } = &self.state;
         let fluid = p.segment(Kind::Fluid);
         let n = fluid.len();
@@ -323,6 +357,7 @@ impl Cpu {
                 density: &p.density[range.clone()],
                 owner: &p.owner[range],
                 neighbours: &neighbours[c],
+                gravity,
             };
             part.tally(model, sum);
         });
@@ -330,8 +365,11 @@ impl Cpu {
             left: self.ledger.left,
             lost: self.ledger.lost,
             nonfinite: self.ledger.nonfinite,
+            fast_contacts: self.ledger.fast_contacts,
+            external_force: b.joint_force,
+            external_impulse: b.joint_impulse,
             fluid: n,
-            rigid_lost: self.cells[Kind::Rigid as usize].lost,
+            rigid_lost: self.cells[Kind::Rigid as usize].lost.saturating_sub(self.scripted_outside(model)),
             ..Ledger::default()
         };
         let mut full = 0.0;
@@ -359,7 +397,10 @@ impl Cpu {
             }
             total.momentum += body.mass * body.v;
             total.momentum_scale += body.mass * body.v.length();
-            total.external_force += body.mass * model.gravity;
+            total.external_force += body.mass * gravity;
+            if body.one_way {
+                total.external_force -= body.force_fluid;
+            }
             total.total_force += body.force;
             total.kinetic += 0.5 * (body.mass * body.v.length_squared() + body.l.dot(body.omega));
             total.potential -= body.mass * model.gravity.dot(body.x - model.grid.min);
@@ -369,13 +410,24 @@ impl Cpu {
             }
         }
         for (slot, record) in b.record[..b.rigid_slots].iter().enumerate() {
-            total.speed = total.speed.max(f64::from(glam::Vec3::from(record.v).length()));
-            if !model.fields.is_empty() {
+            total.body_speed = total.body_speed.max(f64::from(glam::Vec3::from(record.v).length()));
+            if !model.fields.is_empty() && model.moves(b.owner[slot]) {
                 let mass = f64::from(self.particle_mass[b.owner[slot] as usize]);
                 total.external_force += mass * forces::fields(model, record).as_dvec3();
             }
         }
+        total.speed = total.speed.max(total.body_speed);
         self.ledger = total;
+    }
+
+    /// Particles of scripted bodies that are now beyond a solid wall: they may.
+    fn scripted_outside(&self, model: &Model) -> usize {
+        if self.cells[Kind::Rigid as usize].lost == 0 {
+            return 0;
+        }
+        let b = &self.state.bodies;
+        let outside = |slot: &usize| self.place[*slot].load(Relaxed) == GONE;
+        (0..b.rigid_slots).filter(|&slot| !model.moves(b.owner[slot])).filter(outside).count()
     }
 }
 
@@ -386,6 +438,7 @@ struct Part<'a> {
     density: &'a [f32],
     owner: &'a [u32],
     neighbours: &'a NeighbourChunk,
+    gravity: DVec3,
 }
 
 impl Part<'_> {
@@ -403,7 +456,7 @@ impl Part<'_> {
             sum.momentum_scale += mass * speed;
             sum.total_force += mass * a;
             sum.force_scale += mass * a.length();
-            let mut outside = model.gravity;
+            let mut outside = self.gravity;
             if !model.fields.is_empty() {
                 outside += forces::fields(model, r).as_dvec3();
             }

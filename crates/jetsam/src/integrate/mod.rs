@@ -4,6 +4,7 @@
 //! the step, because viscosity and dashpots need them there. Kick corrects the prediction with the new forces.
 
 pub mod bodies;
+pub mod joints;
 pub mod particles;
 
 /// How a step advances time.
@@ -11,6 +12,8 @@ pub mod particles;
 pub struct Advance {
     /// Length of the step (s).
     pub dt: f64,
+    /// Simulated time at its end (s).
+    pub time: f64,
     /// Drag on fluids (1/s): not zero only while a scene settles, and then bodies stand still.
     pub drag: f64,
 }

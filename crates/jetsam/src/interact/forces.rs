@@ -1,15 +1,16 @@
 //! Stage `forces`: every law of pairs, evaluated from both ends of each pair (E4-E6, E10-E12, E16, E17, E30).
 //!
 //! In: neighbour runs, records with pressure shares. Out: `push`, an acceleration (m/s^2) for fluids and a force
-//! (N) for the particles of bodies, and `carry` for XSPH.
+//! (N) for the particles of bodies, `touch`, of what that force consists, and `carry` for XSPH.
 
+use super::contacts::{self, Friction, Surfaces};
 use super::density::{each_lane, weights};
 use super::lanes::{LANES, Lanes, gather, sum};
 use super::neighbours::{NeighbourChunk, Runs};
 use crate::laws::{contact, field, fluid, kernel::Kernel};
 use crate::model::Model;
 use crate::scene::{Coupling, Damping, Force, Viscosity};
-use crate::state::{Kind, Record};
+use crate::state::{Kind, Record, Touch};
 use fearless_simd::Simd;
 use glam::{DVec3, Vec3};
 
@@ -26,6 +27,10 @@ pub struct Input<'a> {
     pub first: usize,
     /// Mass of the particles of each body (kg), for fields.
     pub particle_mass: &'a [f32],
+    /// What contacts know of bodies.
+    pub surfaces: Surfaces<'a>,
+    /// Gravity now (m/s^2), shaking of the scene included.
+    pub gravity: Vec3,
     /// Length of the step (s).
     pub dt: f32,
 }
@@ -39,16 +44,18 @@ pub fn chunk<S: Simd>(
     chunk: &NeighbourChunk,
     push: &mut [[f32; 3]],
     carry: &mut [[f32; 3]],
+    touch: &mut [Touch],
 ) {
     for (k, runs) in chunk.runs.iter().enumerate() {
         let i = input.first + k;
-        let (force, carried) = match kind {
-            Kind::Fluid => on_fluid(simd, &input, chunk, runs, i),
-            _ => (on_body(simd, &input, kind, chunk, runs, i), Vec3::ZERO),
-        };
-        push[k] = force.to_array();
-        if let Some(c) = carry.get_mut(k) {
-            *c = carried.to_array();
+        if kind == Kind::Fluid {
+            let (force, carried) = on_fluid(simd, &input, chunk, runs, i);
+            push[k] = force.to_array();
+            if let Some(c) = carry.get_mut(k) {
+                *c = carried.to_array();
+            }
+        } else {
+            (push[k], touch[k]) = on_body(simd, &input, kind, chunk, runs, i);
         }
     }
 }
@@ -91,14 +98,14 @@ fn on_fluid<S: Simd>(simd: S, input: &Input, chunk: &NeighbourChunk, runs: &Runs
             contacts += sum_contacts(input, own, list, |(_, body)| Some(model.coupling_pair(owner, body)));
         }
     }
-    let mut acceleration = (pairs.force(simd) + contacts) / me.mass + model.gravity_f32();
+    let mut acceleration = (pairs.force(simd) + contacts) / me.mass + input.gravity;
     acceleration += fields(model, own);
     (acceleration, pairs.carry(simd))
 }
 
-/// Force on a particle of a body.
+/// Force on a particle of a body, and of what it consists.
 #[inline(always)]
-fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, runs: &Runs, i: usize) -> Vec3 {
+fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, runs: &Runs, i: usize) -> ([f32; 3], Touch) {
     let model = input.model;
     let own = &input.records[i];
     let owner = input.owner[i];
@@ -122,14 +129,17 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, 
     force += sum_contacts(input, own, fluids, |(other, fluid)| {
         springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
     });
+    let mut touch = Touch { fluid: force.to_array(), ..Touch::default() };
+    let mut friction = Friction::default();
     for other in [Kind::Rigid, Kind::Static] {
-        let list = &chunk.list[runs.exact(other)];
-        force += sum_contacts(input, own, list, |(_, body)| Some(model.contact_pair(owner, body)));
+        contacts::add(input, i, &chunk.list[runs.exact(other)], &mut touch, &mut friction);
     }
-    if kind == Kind::Rigid {
+    touch.slip = friction.slip();
+    force += Vec3::from(touch.contact);
+    if model.moves(owner) {
         force += fields(model, own) * input.particle_mass[owner as usize];
     }
-    force
+    (force.to_array(), touch)
 }
 
 /// Whether a fluid particle meets particles of bodies of a kind by springs (E16): where that is the coupling, and
@@ -139,7 +149,7 @@ fn springs(model: &Model, kind: Kind, fluid: &Record) -> bool {
     (kind == Kind::Rigid && model.solver.coupling == Coupling::Spring) || fluid.share <= 0.0
 }
 
-/// Sum of contact forces (E12) on a particle. `constants` gives spring and dashpot for the other and its owner, or
+/// Sum of the forces (E12) of springs between a fluid's particle and bodies'. `constants` gives spring and dashpot for the other and its owner, or
 /// `None` where there is no contact.
 #[inline(always)]
 fn sum_contacts(
@@ -176,6 +186,7 @@ pub fn fields(model: &Model, own: &Record) -> Vec3 {
         let a = match *force {
             Force::Point { center, strength, core } => field::point_gravity(away(center), strength as f32, core as f32),
             Force::Wind { velocity, rate } => field::wind(own.v, single(velocity).to_array(), rate as f32),
+            Force::Shake(_) => continue, // part of gravity
             Force::Vortex { center, axis, speed, core, rate } => {
                 let axis = single(axis).normalize_or_zero().to_array();
                 field::vortex(away(center), own.v, axis, speed as f32, core as f32, rate as f32)
@@ -191,7 +202,7 @@ pub fn fields(model: &Model, own: &Record) -> Vec3 {
 
 /// A difference of places, by the shortest way on periodic axes.
 #[inline(always)]
-fn wrap(model: &Model, mut d: Vec3) -> Vec3 {
+pub fn wrap(model: &Model, mut d: Vec3) -> Vec3 {
     for a in 0..3 {
         let period = model.grid.period[a];
         if period > 0.0 {
