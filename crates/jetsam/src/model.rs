@@ -194,9 +194,9 @@ impl Model {
     }
 
     /// Tangential spring (N/m), its dashpot (N s/m) and friction of one contact of bodies `a` and `b` with the normal
-    /// spring `k` times `part` (E13). Symmetric to the last bit.
+    /// spring `k` times `part`, while `counted` contacts share the load (E13). Symmetric to the last bit.
     #[inline]
-    pub fn friction_pair(&self, a: u32, b: u32, k: f32, part: f32) -> (f32, f32, f32) {
+    pub fn friction_pair(&self, a: u32, b: u32, k: f32, part: f32, counted: f32) -> (f32, f32, f32) {
         let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
         let mu = match (a.friction < 0.0, b.friction < 0.0) {
             (true, _) => b.friction,
@@ -204,9 +204,9 @@ impl Model {
             _ => (a.friction * b.friction).sqrt(),
         };
         let mass = 1.0 / (a.inverse_mass + b.inverse_mass);
-        let shared_by = a.shared_by.max(b.shared_by);
+        let n = a.shared_by.max(b.shared_by).max(counted);
         let k_t = TANGENTIAL * k;
-        let eta_t = part * crate::laws::contact::dashpot(TANGENTIAL_DAMPING, k_t / part * shared_by, mass) / shared_by;
+        let eta_t = part * crate::laws::contact::dashpot(TANGENTIAL_DAMPING, k_t / part * n, mass) / n;
         (k_t, eta_t, mu)
     }
 
@@ -214,6 +214,12 @@ impl Model {
     /// Symmetric to the last bit.
     #[inline]
     pub fn contact_pair(&self, a: u32, b: u32) -> (f32, f32) {
+        self.contact_pair_of(a, b, 1.0)
+    }
+
+    /// The same while `counted` contacts share the load: the dashpot's part is the smaller.
+    #[inline]
+    pub fn contact_pair_of(&self, a: u32, b: u32, counted: f32) -> (f32, f32) {
         let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
         let reduced_mass = 1.0 / (a.inverse_mass + b.inverse_mass);
         self.contact_constants(
@@ -224,6 +230,7 @@ impl Model {
                 _ => 0.5 * (a.ln_restitution + b.ln_restitution),
             },
             a.shared_by.max(b.shared_by),
+            counted,
             a.stiffness.max(b.stiffness),
             a.damping.max(b.damping),
         )
@@ -234,11 +241,19 @@ impl Model {
     pub fn coupling_pair(&self, fluid: u32, b: u32) -> (f32, f32) {
         let b = &self.contacts[b as usize];
         let reduced_mass = 1.0 / (1.0 / self.fluids[fluid as usize].mass + b.inverse_mass);
-        self.contact_constants(reduced_mass, b.ln_restitution, 1.0, b.stiffness, b.damping)
+        self.contact_constants(reduced_mass, b.ln_restitution, 1.0, 1.0, b.stiffness, b.damping)
     }
 
     #[inline]
-    fn contact_constants(&self, mass: f32, ln_e: f32, shared_by: f32, stated_k: f32, stated_eta: f32) -> (f32, f32) {
+    fn contact_constants(
+        &self,
+        mass: f32,
+        ln_e: f32,
+        shared_by: f32,
+        counted: f32,
+        stated_k: f32,
+        stated_eta: f32,
+    ) -> (f32, f32) {
         use crate::laws::contact::{damping_ratio, dashpot};
         let k = if stated_k > 0.0 {
             stated_k
@@ -247,20 +262,20 @@ impl Model {
             let rate = self.largest_speed / (self.solver.contact_overlap * self.spacing);
             mass * (rate * rate) as f32 / shared_by
         };
-        let eta =
-            if stated_eta >= 0.0 { stated_eta } else { dashpot(damping_ratio(ln_e), k * shared_by, mass) / shared_by };
+        let n = shared_by.max(counted);
+        let eta = if stated_eta >= 0.0 { stated_eta } else { dashpot(damping_ratio(ln_e), k * n, mass) / n };
         (k, eta)
     }
 
-    /// Duration of a contact of body `a` with its like (s), all sharers of the load together.
-    pub fn contact_time(&self, a: usize) -> f64 {
+    /// Duration of a contact of body `a` with its like (s), when `sharers` contacts share the load.
+    pub fn contact_time(&self, a: usize, sharers: f32) -> f64 {
         let c = &self.contacts[a];
         if c.inverse_mass == 0.0 {
             return f64::INFINITY;
         }
         let (k, _) = self.contact_pair(a as u32, a as u32);
         let mass = 0.5 / f64::from(c.inverse_mass);
-        std::f64::consts::PI * (mass / (f64::from(k) * f64::from(c.shared_by))).sqrt()
+        std::f64::consts::PI * (mass / (f64::from(k) * f64::from(sharers))).sqrt()
     }
 
     /// Largest time step allowed now and what bounds it (E29), from the largest speed (m/s) and acceleration (m/s^2).

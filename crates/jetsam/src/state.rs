@@ -54,6 +54,8 @@ pub struct Touch {
     pub slip: [f32; 3],
     /// Particles it touches.
     pub contacts: u32,
+    /// Their parts, summed: beside each other the particles of a face share one contact.
+    pub sharers: f32,
     /// Of these, how many are so deep that they would pass through.
     pub deep: u32,
 }
@@ -140,6 +142,8 @@ pub struct Body {
     pub torque_contact: DVec3,
     /// Pairs of particles in contact with other bodies and walls. Written by bodies.
     pub contacts: u32,
+    /// Contacts that share its load: the parts of its pairs, summed; 0 for what forces do not move. Written by bodies.
+    pub sharers: f32,
     /// Whether some pair is so deep that it would pass through. Written by bodies.
     pub deep: bool,
     /// Whether fluids do not move the body, though it moves them.

@@ -93,6 +93,7 @@ fn a_moving_floor_carries_a_body_with_its_friction() {
     println!("{late:.4} s, {expected:.4} expected");
     assert!((late / expected - 1.0).abs() < 0.1, "{late} {expected}");
     let b = &w.state().bodies.body;
+    println!("{} {}", b[0].v.x, b[1].x.x);
     assert!((b[0].v.x - 0.2).abs() < 1e-3 && (b[1].x.x - 0.06).abs() < 1e-9);
     // what the table feels is what the block feels, reversed; it bears the weight
     assert!((b[1].force_contact + b[0].force_contact).length() < 1e-4 * b[0].mass * 9.81);

@@ -240,7 +240,8 @@ impl Scene {
             contact = contact.min(std::f64::consts::PI / rate.sqrt() / 20.0);
         }
         for a in 0..model.contacts.len() {
-            contact = contact.min(model.contact_time(a) / 20.0);
+            let c = &model.contacts[a];
+            contact = contact.min(model.contact_time(a, c.shared_by) / 20.0).min(model.contact_time(a, c.face) / 8.0);
         }
         if s.coupling == Coupling::Spring && !self.rigid.is_empty() {
             for (index, _) in self.fluid.iter().enumerate() {

@@ -177,6 +177,7 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
             torque_fluid: DVec3::ZERO,
             torque_contact: DVec3::ZERO,
             contacts: 0,
+            sharers: 0.0,
             deep: false,
             one_way: b.one_way,
             acceleration: DVec3::ZERO,

@@ -33,6 +33,8 @@ pub struct Cpu {
     particle_mass: Vec<f32>,
     /// Angular velocity of each body (rad/s), for contacts.
     spin: Vec<[f32; 3]>,
+    /// Contacts that shared the load of each body.
+    sharers: Vec<f32>,
     sums: Vec<Ledger>,
     ledger: Ledger,
     static_copies: u32,
@@ -59,6 +61,7 @@ impl Default for Cpu {
             parts: Vec::new(),
             particle_mass: Vec::new(),
             spin: Vec::new(),
+            sharers: Vec::new(),
             sums: Vec::new(),
             ledger: Ledger::default(),
             static_copies: 0,
@@ -277,7 +280,10 @@ impl Cpu {
         let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
         self.spin.clear();
         self.spin.extend(b.body.iter().map(|b| b.omega.as_vec3().to_array()));
-        let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slip: &b.slip, spin: &self.spin };
+        self.sharers.clear();
+        self.sharers.extend(b.body.iter().map(|b| b.sharers));
+        let (spin, sharers) = (&self.spin, &self.sharers);
+        let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slip: &b.slip, spin, sharers };
         let (gravity, dt) = (model.gravity_at(advance.time).as_vec3(), advance.dt as f32);
         let bodies_first = p.first[Kind::Rigid as usize];
         for kind in Kind::ALL {

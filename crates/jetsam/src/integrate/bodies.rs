@@ -125,6 +125,7 @@ struct Sum {
     force: [DVec3; 3],
     torque: [DVec3; 3],
     contacts: u32,
+    sharers: f64,
     deep: u32,
 }
 
@@ -161,6 +162,7 @@ pub fn sum<'a>(
             sum.torque[0] += double(touch.couple);
             sum.torque[2] += double(touch.couple);
             sum.contacts += touch.contacts;
+            sum.sharers += f64::from(touch.sharers);
             sum.deep += touch.deep;
         }
         part.sum = sum;
@@ -173,6 +175,7 @@ pub fn sum<'a>(
             to.torque[k] += from.torque[k];
         }
         to.contacts += from.contacts;
+        to.sharers += from.sharers;
         to.deep += from.deep;
     }
     for (body, mut sum) in bodies.body.iter_mut().zip(total) {
@@ -187,6 +190,7 @@ pub fn sum<'a>(
         }
         if !body.is_static() {
             body.force += body.mass * gravity;
+            body.sharers = sum.sharers as f32;
         }
         body.contacts = sum.contacts;
         body.deep = sum.deep > 0;

@@ -19,6 +19,8 @@ pub struct Surfaces<'a> {
     pub facing: &'a [[f32; 3]],
     /// Tangential slips (m), by slot.
     pub slip: &'a [[f32; 3]],
+    /// Contacts that shared the load at the last step, by body.
+    pub sharers: &'a [f32],
     /// Angular velocities (rad/s), by body.
     pub spin: &'a [[f32; 3]],
 }
@@ -70,7 +72,8 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
             let spin = |body: u32| Vec3::from(surfaces.spin[body as usize]);
             v -= 0.5 * (spin(owner) + spin(body)).cross(d);
         }
-        let (k, eta) = model.contact_pair(owner, body);
+        let counted = surfaces.sharers[owner as usize].max(surfaces.sharers[body as usize]);
+        let (k, eta) = model.contact_pair_of(owner, body, counted);
         let f = contact::contact_force(along.to_array(), v.to_array(), s, diameter, k, eta, f32::from(!full), input.dt);
         let mut f = Vec3::new(f.x, f.y, f.z) * part;
         let speed = v.dot(n);
@@ -80,9 +83,11 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
         }
         if s < diameter {
             touch.contacts += 1;
+            touch.sharers += part;
             if !full {
                 let slip = Vec3::from(surfaces.slip[slot]) - Vec3::from(surfaces.slip[other_slot]);
-                f += friction.pair(model, [owner, body], k * part, part, slip, v - n * speed, (-f.dot(n)).max(0.0), n, input.dt);
+                let springs = model.friction_pair(owner, body, k * part, part, counted);
+                f += friction.pair(model, [owner, body], springs, slip, v - n * speed, (-f.dot(n)).max(0.0), n, input.dt);
             }
         }
         touch.contact = (Vec3::from(touch.contact) + f).to_array();
@@ -101,22 +106,20 @@ pub struct Friction {
 
 impl Friction {
     /// Tangential force of a pair. `slip` and `v` are those of the other particle relative to this one, `load` the
-    /// normal force.
+    /// normal force; the springs are those of [`Model::friction_pair`].
     #[inline(always)]
     #[allow(clippy::too_many_arguments)] // one caller
     fn pair(
         &mut self,
         model: &Model,
         pair: [u32; 2],
-        k: f32,
-        part: f32,
+        (k_t, eta_t, mu): (f32, f32, f32),
         slip: Vec3,
         v: Vec3,
         load: f32,
         n: Vec3,
         dt: f32,
     ) -> Vec3 {
-        let (k_t, eta_t, mu) = model.friction_pair(pair[0], pair[1], k, part);
         if mu <= 0.0 {
             return Vec3::ZERO;
         }
