@@ -134,9 +134,9 @@ fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, 
     for other in [Kind::Rigid, Kind::Static] {
         contacts::add(input, i, &chunk.list[runs.exact(other)], &mut touch, &mut friction);
     }
-    touch.slip = friction.slip();
     force += Vec3::from(touch.contact);
     if model.moves(owner) {
+        touch.slip = friction.slip();
         force += fields(model, own) * input.particle_mass[owner as usize];
     }
     (force.to_array(), touch)
