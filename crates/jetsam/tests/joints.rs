@@ -115,7 +115,11 @@ fn a_free_chain_keeps_its_momenta() {
         worst = worst.max((e / e_0 - 1.0).abs());
     }
     let (p, l, _) = momenta(&w);
-    println!("momentum off by {:.1e}, angular by {:.1e}, energy by {worst:.1e}", (p - p_0).length() / p_0.length(), (l - l_0).length() / l_0.length());
+    println!(
+        "momentum off by {:.1e}, angular by {:.1e}, energy by {worst:.1e}",
+        (p - p_0).length() / p_0.length(),
+        (l - l_0).length() / l_0.length()
+    );
     assert!((p - p_0).length() < 1e-9 * p_0.length());
     assert!((l - l_0).length() < 1e-6 * l_0.length());
     assert!(worst < 1e-2, "energy drifts by {worst}");

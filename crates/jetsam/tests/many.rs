@@ -91,7 +91,13 @@ fn shot(times: f64) -> (f64, f64, World) {
     // r = 0.02 m, k = 1e5 N/m, four contacts, m = 2 kg: four times m* = 0.5 kg on one; v = r sqrt(k / m*) = 8.94 m/s
     let limit = 0.02 * (1e5f64 / 0.5).sqrt();
     let points = |n: i32, z: f64| {
-        let one = |k: i32| format!("[{}, {}, {z}]", 0.02 * f64::from(k % n) - 0.01 * f64::from(n - 1), 0.02 * f64::from(k / n) - 0.01 * f64::from(n - 1));
+        let one = |k: i32| {
+            format!(
+                "[{}, {}, {z}]",
+                0.02 * f64::from(k % n) - 0.01 * f64::from(n - 1),
+                0.02 * f64::from(k / n) - 0.01 * f64::from(n - 1)
+            )
+        };
         (0..n * n).map(one).collect::<Vec<_>>().join(", ")
     };
     let mut w = world(&format!(
@@ -154,12 +160,13 @@ fn bodies_that_overlap_are_moved_apart_before_time_begins() {
         )
     };
     // two boxes half inside each other, two at the same place, one sunk into the floor
-    let text = "[world]\ngravity = [0, 0, -1e-6]\n[domain]\nmin = [-1, -1, 0]\nmax = [1, 1, 1]\n[resolution]\nspacing = 0.02\n".to_owned()
-        + &body(0.0, 0.5)
-        + &body(0.045, 0.52)
-        + &body(0.5, 0.5)
-        + &body(0.5, 0.5)
-        + &body(-0.5, 0.048);
+    let text =
+        "[world]\ngravity = [0, 0, -1e-6]\n[domain]\nmin = [-1, -1, 0]\nmax = [1, 1, 1]\n[resolution]\nspacing = 0.02\n"
+            .to_owned()
+            + &body(0.0, 0.5)
+            + &body(0.045, 0.52)
+            + &body(0.5, 0.5)
+            + &body(0.5, 0.5) + &body(-0.5, 0.048);
     let mut w = world(&text);
     let said = w.model().warnings.iter().find(|s| s.contains("overlapped")).cloned();
     println!("{said:?}");
@@ -187,13 +194,20 @@ fn a_heap_comes_to_rest_on_the_floor() {
         w.advance(until, |_, r| r.trouble.is_none());
         let l = w.ledger();
         let now = l.kinetic + l.potential;
-        println!("{:.2} s: energy {:.4} of the first, kinetic {:.2e} J, fast {}", w.time(), now / begin, l.kinetic, l.fast_contacts);
+        println!(
+            "{:.2} s: energy {:.4} of the first, kinetic {:.2e} J, fast {}",
+            w.time(),
+            now / begin,
+            l.kinetic,
+            l.fast_contacts
+        );
         assert!(now <= last * 1.001, "energy grows: {now} after {last}");
         last = now;
     }
     let l = w.ledger();
     assert_eq!((l.lost, l.rigid_lost, l.nonfinite), (0, 0, 0));
-    let rest = (2.0 * l.kinetic / w.state().bodies.body.iter().filter(|b| !b.is_static()).map(|b| b.mass).sum::<f64>()).sqrt();
+    let rest =
+        (2.0 * l.kinetic / w.state().bodies.body.iter().filter(|b| !b.is_static()).map(|b| b.mass).sum::<f64>()).sqrt();
     println!("mean speed {rest:.2e} m/s");
     assert!(rest < 0.01, "still moves at {rest} m/s");
     for b in w.state().bodies.body.iter().filter(|b| !b.is_static()) {

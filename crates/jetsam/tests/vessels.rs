@@ -70,7 +70,12 @@ fn a_free_cup_of_water_stands_on_the_floor() {
     });
     let b = &w.state().bodies.body[0];
     let expected = 9.81 * (b.mass + n as f64 * f64::from(w.model().fluids[0].mass));
-    println!("floor bears {:.4} of the weight; {} of {n} in the cup; tilt {:.1e}", weight / samples / expected, inside(&w), (b.q * DVec3::Z - DVec3::Z).length());
+    println!(
+        "floor bears {:.4} of the weight; {} of {n} in the cup; tilt {:.1e}",
+        weight / samples / expected,
+        inside(&w),
+        (b.q * DVec3::Z - DVec3::Z).length()
+    );
     assert!((weight / samples / expected - 1.0).abs() < 0.03, "{}", weight / samples / expected);
     assert_eq!(inside(&w), n);
 }

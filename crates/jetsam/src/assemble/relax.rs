@@ -5,8 +5,10 @@ use super::near::Near;
 use crate::scene::joint::JointModel;
 use glam::DVec3;
 
-/// Overlap, as a fraction of the contact diameter, that calls for it: springs hold less.
-const DEEP: f64 = 0.5;
+/// Overlap, as a fraction of the contact diameter, that calls for it: lattices that touch overlap less.
+const DEEP: f64 = 0.12;
+/// The same where both know their springs: whoever states them may mean to start in contact.
+const DEEP_STATED: f64 = 0.5;
 /// Overlap that may be left.
 const LEFT: f64 = 0.02;
 /// Rounds at most.
@@ -35,9 +37,13 @@ pub(super) fn relax(
         for (index, body) in bodies.iter().enumerate().filter(|(_, b)| b.mass.is_finite()) {
             body.points().for_each(|p| free.insert_tagged(p, index as u32));
         }
-        let limit = if round == 0 { DEEP } else { LEFT };
         let mut moves = vec![DVec3::ZERO; bodies.len()];
         for a in (0..bodies.len()).filter(|&a| bodies[a].mass.is_finite()) {
+            let limit = match (round, bodies[a].stiffness) {
+                (0, None) => DEEP,
+                (0, Some(_)) => DEEP_STATED,
+                _ => LEFT,
+            };
             let mut pushes: std::collections::BTreeMap<usize, (DVec3, f64)> = Default::default();
             for p in bodies[a].points() {
                 let mut meet = |d: DVec3, tag: u32| {

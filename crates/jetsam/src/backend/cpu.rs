@@ -6,8 +6,8 @@
 use super::Backend;
 use crate::integrate::{Advance, bodies, joints, particles};
 use crate::interact::cells::{Cells, Grid};
-use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
 use crate::interact::contacts::Surfaces;
+use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
 use crate::interact::{CHUNK, boundary, density, forces, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;

@@ -1,8 +1,8 @@
 //! Rigid bodies: the sum of forces and torques (E18), drift and kick (E20), and particles that follow (E21).
 
 use crate::model::Model;
-use crate::scene::motion::Path;
 use crate::scene::Integrator;
+use crate::scene::motion::Path;
 use crate::state::{Bodies, Body, Record, Touch};
 use glam::{DQuat, DVec3, Vec3};
 use rayon::prelude::*;

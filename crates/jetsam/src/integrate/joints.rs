@@ -36,7 +36,8 @@ impl End {
     /// Velocity of the anchor by a unit impulse at it.
     fn compliance(&self) -> DMat3 {
         let r = self.arm;
-        let cross = DMat3::from_cols(DVec3::new(0.0, r.z, -r.y), DVec3::new(-r.z, 0.0, r.x), DVec3::new(r.y, -r.x, 0.0));
+        let cross =
+            DMat3::from_cols(DVec3::new(0.0, r.z, -r.y), DVec3::new(-r.z, 0.0, r.x), DVec3::new(r.y, -r.x, 0.0));
         DMat3::from_diagonal(DVec3::splat(self.inverse_mass)) - cross * self.inverse_inertia * cross
     }
 }
@@ -55,11 +56,7 @@ pub fn drift(bodies: &mut Bodies, model: &Model, dt: f64) {
         return;
     }
     let place = |body: &Body| {
-        if body.is_static() {
-            (body.x, body.q)
-        } else {
-            (body.x + dt * body.v_half, turned(body, body.l_half, dt))
-        }
+        if body.is_static() { (body.x, body.q) } else { (body.x + dt * body.v_half, turned(body, body.l_half, dt)) }
     };
     sweep(model, |joint| {
         let (a, b) = (&bodies.body[joint.a], joint.b.map(|b| &bodies.body[b]));

@@ -87,7 +87,16 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
             if !full {
                 let slip = Vec3::from(surfaces.slip[slot]) - Vec3::from(surfaces.slip[other_slot]);
                 let springs = model.friction_pair(owner, body, k * part, part, counted);
-                f += friction.pair(model, [owner, body], springs, slip, v - n * speed, (-f.dot(n)).max(0.0), n, input.dt);
+                f += friction.pair(
+                    model,
+                    [owner, body],
+                    springs,
+                    slip,
+                    v - n * speed,
+                    (-f.dot(n)).max(0.0),
+                    n,
+                    input.dt,
+                );
             }
         }
         touch.contact = (Vec3::from(touch.contact) + f).to_array();

@@ -105,7 +105,14 @@ fn on_fluid<S: Simd>(simd: S, input: &Input, chunk: &NeighbourChunk, runs: &Runs
 
 /// Force on a particle of a body, and of what it consists.
 #[inline(always)]
-fn on_body<S: Simd>(simd: S, input: &Input, kind: Kind, chunk: &NeighbourChunk, runs: &Runs, i: usize) -> ([f32; 3], Touch) {
+fn on_body<S: Simd>(
+    simd: S,
+    input: &Input,
+    kind: Kind,
+    chunk: &NeighbourChunk,
+    runs: &Runs,
+    i: usize,
+) -> ([f32; 3], Touch) {
     let model = input.model;
     let own = &input.records[i];
     let owner = input.owner[i];

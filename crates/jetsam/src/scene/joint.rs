@@ -116,7 +116,8 @@ impl Scene {
                 let message = format!("`{key}.limits` must hold 0, where the hinge begins, within [-180, 180]");
                 return Err(self.error(&format!("{key}.limits"), message, "give e.g. limits = [-30, 90]"));
             }
-            let frame = |body: Option<usize>| body.map_or((DVec3::ZERO, DQuat::IDENTITY), |i| (bodies[i].1, bodies[i].2));
+            let frame =
+                |body: Option<usize>| body.map_or((DVec3::ZERO, DQuat::IDENTITY), |i| (bodies[i].1, bodies[i].2));
             let ((x_a, q_a), (x_b, q_b)) = (frame(Some(a)), frame(b));
             let (end_a, end_b) = (DVec3::from(joint.anchor), DVec3::from(joint.anchor_b.unwrap_or(joint.anchor)));
             let axis = if self.world.dimensions == 2 { DVec3::Y } else { axis.normalize() };

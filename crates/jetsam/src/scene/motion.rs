@@ -177,7 +177,8 @@ impl Path {
 
     /// Where the body is at a time (s).
     pub fn at(&self, time: f64) -> Pose {
-        let rest = Pose { x: self.x, q: self.q, v: DVec3::ZERO, omega: DVec3::ZERO, a: DVec3::ZERO, alpha: DVec3::ZERO };
+        let rest =
+            Pose { x: self.x, q: self.q, v: DVec3::ZERO, omega: DVec3::ZERO, a: DVec3::ZERO, alpha: DVec3::ZERO };
         match &self.motion {
             Motion::None => rest,
             Motion::Translation { velocity, start, stop } => {
@@ -192,7 +193,8 @@ impl Path {
             }
             Motion::Oscillation(o) => {
                 let s = swing(o, time);
-                let turned = self.turned(DVec3::from(o.axis), DVec3::from(o.center), s.map(|s| s * o.angle.to_radians()));
+                let turned =
+                    self.turned(DVec3::from(o.axis), DVec3::from(o.center), s.map(|s| s * o.angle.to_radians()));
                 let along = DVec3::from(o.amplitude);
                 Pose { x: turned.x + s[0] * along, v: turned.v + s[1] * along, a: turned.a + s[2] * along, ..turned }
             }
@@ -261,7 +263,11 @@ fn hermite(times: &[f64], value: impl Fn(usize) -> DVec4, time: f64) -> [DVec4; 
     let s = (time - times[k]) / h;
     let (a, b, m, n) = (value(k), value(k + 1), tangent(k) * h, tangent(k + 1) * h);
     let (c_2, c_3) = (3.0 * (b - a) - 2.0 * m - n, 2.0 * (a - b) + m + n);
-    [a + s * (m + s * (c_2 + s * c_3)), (m + s * (2.0 * c_2 + 3.0 * s * c_3)) / h, (2.0 * c_2 + 6.0 * s * c_3) / (h * h)]
+    [
+        a + s * (m + s * (c_2 + s * c_3)),
+        (m + s * (2.0 * c_2 + 3.0 * s * c_3)) / h,
+        (2.0 * c_2 + 6.0 * s * c_3) / (h * h),
+    ]
 }
 
 impl super::Scene {

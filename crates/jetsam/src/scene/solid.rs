@@ -246,9 +246,7 @@ impl Shape {
     /// Whether a point is inside; in a flat scene y does not count.
     fn contains(&self, p: DVec3, flat: bool) -> bool {
         match self {
-            Shape::Box(Region { min, max }) => {
-                (0..3).all(|a| (flat && a == 1) || (min[a]..=max[a]).contains(&p[a]))
-            }
+            Shape::Box(Region { min, max }) => (0..3).all(|a| (flat && a == 1) || (min[a]..=max[a]).contains(&p[a])),
             Shape::Sphere { center, radius } => {
                 let mut d = p - DVec3::from(*center);
                 d.y = if flat { 0.0 } else { d.y };
