@@ -108,6 +108,8 @@ pub struct ContactModel {
     pub face: f32,
     /// Friction, or negative where the other body's counts (E13).
     pub friction: f32,
+    /// Whether a joint holds it.
+    pub jointed: bool,
     /// Bodies it does not touch, for a joint holds them together.
     pub joined: Vec<u32>,
     /// Stated spring constant (N/m), or 0.
@@ -184,12 +186,18 @@ impl Model {
         !(self.moves(a) || self.moves(b)) || self.contacts[a as usize].joined.contains(&b)
     }
 
+    /// Reduced mass of bodies `a` and `b` (kg).
+    #[inline]
+    pub fn reduced_mass(&self, a: u32, b: u32) -> f32 {
+        1.0 / (self.contacts[a as usize].inverse_mass + self.contacts[b as usize].inverse_mass)
+    }
+
     /// Dashpot (N s/m) that takes the speed of approach of bodies `a` and `b` within a step if as many contacts as a
     /// face has particles share it, and never more (E12).
     #[inline]
     pub fn stop(&self, a: u32, b: u32, dt: f32) -> f32 {
+        let mass = self.reduced_mass(a, b);
         let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
-        let mass = 1.0 / (a.inverse_mass + b.inverse_mass);
         if dt > 0.0 { mass / (dt * a.face.max(b.face)) } else { 0.0 }
     }
 

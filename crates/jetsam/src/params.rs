@@ -55,6 +55,7 @@ params! {
     courant_viscous: "solver.courant_viscous", "1", 0.5, 1e-3, 1.0;
     contact_overlap: "solver.contact_overlap", "dx", 0.5, 1e-4, 1.0;
     contact_diameter: "solver.contact_diameter", "dx", 1.0, 0.1, 1.5;
+    sleep: "solver.sleep", "s", 0.5, 0.0, 1e9;
     settle: "solver.settle", "s", 0.0, 0.0, 1e3;
     fluid_density: "fluid.density", "kg/m^3", 1000.0, 1e-6, 1e6;
     fluid_viscosity: "fluid.viscosity", "Pa s", 0.001, 0.0, 1e6;
@@ -68,10 +69,6 @@ params! {
     rigid_damping: "rigid.damping", "N s/m", _, 0.0, 1e12;
     rigid_friction: "rigid.friction", "1", 0.4, 0.0, 10.0;
     static_friction: "static.friction", "1", _, 0.0, 10.0;
-    motion_velocity: "static.motion.translation.velocity", "m/s", _, -1e5, 1e5;
-    motion_rate: "static.motion.rotation.rate", "rad/s", _, -1e5, 1e5;
-    motion_period: "static.motion.oscillation.period", "s", _, 1e-6, 1e9;
-    shake_period: "force.shake.period", "s", _, 1e-6, 1e9;
     joint_stiffness: "joint.stiffness", "N/m", 1000.0, 0.0, 1e15;
     joint_damping: "joint.damping", "N s/m", _, 0.0, 1e12;
     joint_length: "joint.length", "m", _, 0.0, 1e6;

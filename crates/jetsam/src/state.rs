@@ -144,6 +144,10 @@ pub struct Body {
     pub contacts: u32,
     /// Contacts that share its load: the parts of its pairs, summed; 0 for what forces do not move. Written by bodies.
     pub sharers: f32,
+    /// How long the body has been still (s); rises while it touches others and moves slowly. Written by kick.
+    pub still: f64,
+    /// Whether the body sleeps: it stays where it is until it is touched. Written by bodies and kick.
+    pub asleep: bool,
     /// Whether some pair is so deep that it would pass through. Written by bodies.
     pub deep: bool,
     /// Whether fluids do not move the body, though it moves them.

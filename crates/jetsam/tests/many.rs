@@ -116,15 +116,11 @@ fn shot(times: f64) -> (f64, f64, World) {
 #[test]
 fn springs_stop_what_they_can_and_say_what_they_cannot() {
     // B9: below the limit a body bounces elastically; above, it is stopped all the same, and counted
-    for times in [0.5, 0.65] {
+    for times in [0.5, 0.9] {
         let (z, e, w) = shot(times);
         println!("{times} x: at {z:.4} m with {e:.3} of its speed, {} fast", w.ledger().fast_contacts);
         assert!(z > 0.0 && (e - 1.0).abs() < 0.02 && w.ledger().fast_contacts == 0, "{times}: {z} {e}");
     }
-    // at 0.9 the overlap passes the depth at which the wall stops hard: it still bounces, less
-    let (z, e, w) = shot(0.9);
-    println!("0.9 x: at {z:.4} m with {e:.3} of its speed, {} fast", w.ledger().fast_contacts);
-    assert!(z > 0.0 && e > 0.0);
     for times in [2.0, 10.0] {
         let (z, e, w) = shot(times);
         println!("{times} x: at {z:.4} m with {e:.3} of its speed, {} fast", w.ledger().fast_contacts);

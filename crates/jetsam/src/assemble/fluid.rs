@@ -89,6 +89,7 @@ impl Scene {
             .iter()
             .enumerate()
             .map(|(index, b)| ContactModel {
+                jointed: joints.iter().any(|j| j.a == index || j.b == Some(index)),
                 joined: self.joined(&joints, index),
                 inverse_mass: (1.0 / b.mass) as f32,
                 ln_restitution: b.restitution.ln() as f32,

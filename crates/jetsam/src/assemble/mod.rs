@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::interact::cells::Grid;
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::scene::{Scene, Shape, Wall};
+use crate::scene::{Force, Scene, Shape, Wall};
 use crate::state::{Bodies, Body, Kind, Particles, Record, State, Touch};
 use bodies::NewBody;
 use fluid::Drop;
@@ -101,6 +101,11 @@ impl Scene {
             let message = "a 2D scene lies in the x-z plane, but gravity has a y component";
             return Err(self.error("world.gravity", message, "give gravity = [x, 0, z]"));
         }
+        for (index, force) in self.force.iter().enumerate() {
+            if let Force::Shake(shake) = force {
+                self.check_period(shake.period, &format!("force.{index}.shake"))?;
+            }
+        }
         if self.fluid.is_empty() && self.rigid.is_empty() {
             return Err(self.error(
                 "",
@@ -178,6 +183,8 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
             torque_contact: DVec3::ZERO,
             contacts: 0,
             sharers: 0.0,
+            still: 0.0,
+            asleep: false,
             deep: false,
             one_way: b.one_way,
             acceleration: DVec3::ZERO,

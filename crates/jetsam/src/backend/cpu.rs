@@ -4,6 +4,7 @@
 //! are made in their order: the same bits for any number of threads.
 
 use super::Backend;
+use crate::integrate::sleep::{self, Rest};
 use crate::integrate::{Advance, bodies, joints, particles};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::contacts::Surfaces;
@@ -16,7 +17,7 @@ use crate::state::{Kind, Record, State, Touch};
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 /// The CPU backend.
 pub struct Cpu {
@@ -33,6 +34,10 @@ pub struct Cpu {
     particle_mass: Vec<f32>,
     /// Angular velocity of each body (rad/s), for contacts.
     spin: Vec<[f32; 3]>,
+    /// Which bodies sleep, what each is to those that touch it, and which were touched by what moves.
+    asleep: Vec<bool>,
+    rest: Vec<Rest>,
+    stirred: Vec<AtomicBool>,
     /// Contacts that shared the load of each body.
     sharers: Vec<f32>,
     sums: Vec<Ledger>,
@@ -62,6 +67,9 @@ impl Default for Cpu {
             particle_mass: Vec::new(),
             spin: Vec::new(),
             sharers: Vec::new(),
+            asleep: Vec::new(),
+            rest: Vec::new(),
+            stirred: Vec::new(),
             sums: Vec::new(),
             ledger: Ledger::default(),
             static_copies: 0,
@@ -80,6 +88,7 @@ impl Backend for Cpu {
         self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
         self.share = vec![0.0; state.particles.record.len()];
         self.parts = bodies::parts(&state.bodies.body);
+        self.stirred = state.bodies.body.iter().map(|_| AtomicBool::new(false)).collect();
         self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
         self.ledger = Ledger::default();
         self.static_copies = 0;
@@ -211,6 +220,8 @@ impl Cpu {
     }
 
     fn density(&mut self, model: &Model) {
+        self.asleep.clear();
+        self.asleep.extend(self.state.bodies.body.iter().map(|b| b.asleep));
         let p = &mut self.state.particles;
         let around = Around {
             grid: &model.grid,
@@ -218,6 +229,7 @@ impl Cpu {
             owner: &p.owner,
             cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
             first: p.first,
+            asleep: &self.asleep,
             support: model.support as f32,
         };
         let (count, first) = (p.count, p.first);
@@ -282,8 +294,11 @@ impl Cpu {
         self.spin.extend(b.body.iter().map(|b| b.omega.as_vec3().to_array()));
         self.sharers.clear();
         self.sharers.extend(b.body.iter().map(|b| b.sharers));
-        let (spin, sharers) = (&self.spin, &self.sharers);
-        let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slip: &b.slip, spin, sharers };
+        self.rest.clear();
+        self.rest.extend(b.body.iter().map(|b| sleep::rest(b)));
+        self.stirred.iter_mut().for_each(|s| *s.get_mut() = false);
+        let (spin, sharers, rest, stirred) = (&self.spin, &self.sharers, &self.rest, &self.stirred);
+        let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slip: &b.slip, sharers, rest, stirred, spin };
         let (gravity, dt) = (model.gravity_at(advance.time).as_vec3(), advance.dt as f32);
         let bodies_first = p.first[Kind::Rigid as usize];
         for kind in Kind::ALL {
@@ -327,7 +342,9 @@ impl Cpu {
             self.ledger.fast_contacts += u64::from(body.deep && !before && !body.is_static());
         }
         b.slip[..b.rigid_slots].par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(slot, slip)| {
-            *slip = felt(slot).map_or([0.0; 3], |(_, touch)| touch.slip);
+            if !b.body[b.owner[slot] as usize].asleep {
+                *slip = felt(slot).map_or([0.0; 3], |(_, touch)| touch.slip);
+            }
         });
     }
 
@@ -344,6 +361,11 @@ impl Cpu {
         if advance.drag == 0.0 {
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::kick(body, integrator, advance.dt));
             joints::kick(b, model);
+            if sleep::possible(model) {
+                for (body, (stirred, contact)) in b.body.iter_mut().zip(self.stirred.iter_mut().zip(&model.contacts)) {
+                    sleep::update(body, model, contact.jointed, *stirred.get_mut(), advance.dt);
+                }
+            }
         }
     }
 

@@ -23,7 +23,7 @@ fn first_kick(integrator: Integrator, dt: f64) -> f64 {
 
 /// E20, first half: half a kick.
 pub fn half_kick(body: &mut Body, model: &Model, dt: f64) {
-    if body.is_static() {
+    if body.is_static() || body.asleep {
         return;
     }
     let kick = first_kick(model.solver.integrator, dt);
@@ -33,7 +33,7 @@ pub fn half_kick(body: &mut Body, model: &Model, dt: f64) {
 
 /// E20: drift, and velocities predicted to the end of the step.
 pub fn drift(body: &mut Body, model: &Model, dt: f64) {
-    if body.is_static() {
+    if body.is_static() || body.asleep {
         return;
     }
     let acceleration = body.force / body.mass;
@@ -67,7 +67,7 @@ pub(super) fn turned(body: &Body, l: DVec3, dt: f64) -> DQuat {
 
 /// E20, second half: the kick with the new force.
 pub fn kick(body: &mut Body, integrator: Integrator, dt: f64) {
-    if body.is_static() || integrator == Integrator::Euler {
+    if body.is_static() || body.asleep || integrator == Integrator::Euler {
         return;
     }
     body.v = body.v_half + 0.5 * dt / body.mass * body.force;
@@ -179,6 +179,9 @@ pub fn sum<'a>(
         to.deep += from.deep;
     }
     for (body, mut sum) in bodies.body.iter_mut().zip(total) {
+        if body.asleep {
+            continue; // what it felt last still holds it
+        }
         if dimensions == 2 {
             sum.torque = sum.torque.map(|t| DVec3::new(0.0, t.y, 0.0));
         }

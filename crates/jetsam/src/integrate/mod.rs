@@ -6,6 +6,7 @@
 pub mod bodies;
 pub mod joints;
 pub mod particles;
+pub mod sleep;
 
 /// How a step advances time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

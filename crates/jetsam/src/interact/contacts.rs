@@ -4,11 +4,13 @@
 //! of forces that act at the middle between two particles, the slip that friction remembers, what was counted.
 
 use super::forces::{Input, wrap};
+use crate::integrate::sleep::Rest;
 use crate::laws::contact;
 use crate::model::Model;
 use crate::scene::{Damping, Surface};
 use crate::state::Touch;
 use glam::Vec3;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// What contacts know of bodies besides their particles' records.
 #[derive(Clone, Copy)]
@@ -21,12 +23,38 @@ pub struct Surfaces<'a> {
     pub slip: &'a [[f32; 3]],
     /// Contacts that shared the load at the last step, by body.
     pub sharers: &'a [f32],
+    /// Whether each body moves, is still, or sleeps.
+    pub rest: &'a [Rest],
+    /// Set for bodies that something restless touches.
+    pub stirred: &'a [AtomicBool],
     /// Angular velocities (rad/s), by body.
     pub spin: &'a [[f32; 3]],
 }
 
-/// Overlap (as a fraction of the contact diameter) beyond which a pair is about to pass through (E12).
-const DEEP: f32 = 0.7;
+impl Surfaces<'_> {
+    /// Notes that bodies `a` and `b` touch: what is restless keeps the other awake.
+    #[inline(always)]
+    fn stir(&self, a: u32, b: u32) {
+        for (one, other) in [(a as usize, b as usize), (b as usize, a as usize)] {
+            if self.rest[one] == Rest::Restless && self.rest[other] != Rest::Restless {
+                self.stirred[other].store(true, Relaxed);
+            }
+        }
+    }
+
+    /// Notes that fluid is near body `b`.
+    #[inline(always)]
+    pub fn wet(&self, b: u32) {
+        if self.rest[b as usize] == Rest::Asleep {
+            self.stirred[b as usize].store(true, Relaxed);
+        }
+    }
+}
+
+/// Overlap (as a fraction of the contact diameter) from which on a pair is looked at that could pass through (E12).
+const DEEP: f32 = 0.5;
+/// It is stopped if its kinetic energy is so many times what the springs may still take.
+const HELD: f32 = 1.05;
 
 /// Adds the contacts with the particles in `list` to `touch`; `friction` collects what the slip is derived from.
 #[inline(always)]
@@ -77,12 +105,16 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
         let f = contact::contact_force(along.to_array(), v.to_array(), s, diameter, k, eta, f32::from(!full), input.dt);
         let mut f = Vec3::new(f.x, f.y, f.z) * part;
         let speed = v.dot(n);
-        if diameter - s > DEEP * diameter && speed < 0.0 {
+        let overlap = diameter - s;
+        let held = counted.max(1.0) * k * (diameter * diameter - overlap * overlap);
+        let mass = model.reduced_mass(owner, body);
+        if overlap > DEEP * diameter && speed < 0.0 && mass * speed * speed > HELD * held {
             f += n * (speed * part * model.stop(owner, body, input.dt));
             touch.deep += 1;
         }
         if s < diameter {
             touch.contacts += 1;
+            surfaces.stir(owner, body);
             touch.sharers += part;
             if !full {
                 let slip = Vec3::from(surfaces.slip[slot]) - Vec3::from(surfaces.slip[other_slot]);

@@ -86,6 +86,9 @@ fn on_fluid<S: Simd>(simd: S, input: &Input, chunk: &NeighbourChunk, runs: &Runs
     for list in run(Kind::Static) {
         pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);
     }
+    for &j in &chunk.list[runs.exact(Kind::Rigid)] {
+        input.surfaces.wet(input.owner[j as usize]);
+    }
     if model.solver.coupling == Coupling::Pressure {
         for list in run(Kind::Rigid) {
             pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);

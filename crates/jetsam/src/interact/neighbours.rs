@@ -99,6 +99,8 @@ pub struct Around<'a> {
     pub cells: [&'a Cells; Kind::COUNT],
     /// First particle of each kind's segment.
     pub first: [usize; Kind::COUNT],
+    /// Whether each body sleeps: its particles look for no neighbours.
+    pub asleep: &'a [bool],
     /// Support radius (m).
     pub support: f32,
 }
@@ -134,6 +136,12 @@ impl NeighbourChunk {
             while to < members.end && around.grid.coordinates(around.records[to].x) == cell {
                 to += 1;
             }
+            let asleep = |i: usize| kind == Kind::Rigid && around.asleep[around.owner[i] as usize];
+            if (from..to).all(asleep) {
+                self.runs.extend((from..to).map(|_| Runs { begin: used as u32, ..Runs::default() }));
+                from = to;
+                continue;
+            }
             let mut candidates = 0;
             for &k in acting(kind) {
                 scratch.tile[k as usize].pack(&around, k, cell);
@@ -150,7 +158,7 @@ impl NeighbourChunk {
             let first_run = self.runs.len();
             for i in from..to {
                 let mut runs = Runs { begin: used as u32, count: [0; Kind::COUNT] };
-                for &k in acting(kind) {
+                for &k in if asleep(i) { &[] } else { acting(kind) } {
                     let tile = &scratch.tile[k as usize];
                     if tile.len == 0 {
                         continue;

@@ -179,6 +179,9 @@ pub struct Solver {
     /// `C_v` of E29: bound by viscosity.
     #[serde(default = "d::courant_viscous")]
     pub courant_viscous: f64,
+    /// How long a body lies still on others before it sleeps, and costs nothing until something touches it. 0: never.
+    #[serde(default = "d::sleep")]
+    pub sleep: f64,
     /// Before time begins, let the fluid come to rest under strong drag for this long (bodies stand still).
     #[serde(default = "d::settle")]
     pub settle: f64,

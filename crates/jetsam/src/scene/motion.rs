@@ -271,6 +271,14 @@ fn hermite(times: &[f64], value: impl Fn(usize) -> DVec4, time: f64) -> [DVec4; 
 }
 
 impl super::Scene {
+    /// A period above zero.
+    pub(crate) fn check_period(&self, period: f64, key: &str) -> crate::error::Result<()> {
+        if period > 0.0 {
+            return Ok(());
+        }
+        Err(self.error(key, format!("`{key}`: period = {period} is not positive"), "give a period above 0 s"))
+    }
+
     /// What is wrong with a motion, if anything: `key` is its path in the scene.
     pub(crate) fn check_motion(&self, motion: &Motion, key: &str) -> crate::error::Result<()> {
         let flat = self.world.dimensions == 2;
@@ -278,7 +286,10 @@ impl super::Scene {
             Motion::None => return Ok(()),
             Motion::Translation { velocity, .. } => (y_axis(), *velocity),
             Motion::Rotation { axis, .. } => (*axis, [0.0; 3]),
-            Motion::Oscillation(o) => (o.axis, o.amplitude),
+            Motion::Oscillation(o) => {
+                self.check_period(o.period, key)?;
+                (o.axis, o.amplitude)
+            }
             Motion::Keyframes(keys) => {
                 if keys.len() < 2 || keys.windows(2).any(|w| w[1].time <= w[0].time) {
                     let message = format!("`{key}` needs at least two keyframes, each later than the one before");
