@@ -25,6 +25,8 @@ pub enum Command {
     Voxelize(Voxelize),
     /// Measure the speed of scenes; one JSON object or one line a case.
     Bench(Bench),
+    /// Run validation cases and compare them with what they expect; exit status 1 if one fails.
+    Validate(Validate),
     /// List the built-in scenes.
     Scenes(Scenes),
     /// List the compute adapters that were found.
@@ -117,7 +119,7 @@ pub enum Save {
     Ply,
     /// The particles of a frame, legacy VTK.
     Vtk,
-    /// The bodies' motion: bodies.csv.
+    /// The bodies' motion and what probes read: bodies.csv, probes.csv.
     Csv,
 }
 
@@ -246,6 +248,30 @@ pub struct Bench {
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
     /// Print one JSON object a case.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Validate {
+    /// Names of cases, their beginnings (A5), groups (A), or paths of scene files; by default every case.
+    pub cases: Vec<String>,
+    /// List the cases.
+    #[arg(long)]
+    pub list: bool,
+    /// What computes.
+    #[arg(long, value_enum, default_value_t)]
+    pub backend: Backend,
+    /// Folder for plots (SVG), readings (CSV) and the whole table (validation.md).
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Override a value of every case by its dotted path.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Threads to compute with; by default one a core.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// Print one JSON object a row.
     #[arg(long)]
     pub json: bool,
 }

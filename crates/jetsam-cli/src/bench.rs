@@ -4,6 +4,7 @@ use crate::run::set_threads;
 use crate::terminal::{print, print_json, progress};
 use crate::{MEMORY, Outcome, args};
 use jetsam::report::StageMillis;
+use jetsam::scene::Shape;
 use jetsam::scene::builtin::SCENES;
 use jetsam::state::Kind;
 use jetsam::{Scene, World, state_hash};
@@ -19,9 +20,11 @@ struct Case {
     scene: String,
     backend: &'static str,
     device: String,
-    /// Fluid and rigid particles.
+    /// Fluid and rigid particles, and agents.
     particles: usize,
-    /// Mean number of fluid neighbours of a fluid particle.
+    /// Agents of flocks among them.
+    agents: usize,
+    /// Mean number of fluid neighbours of a fluid particle; where there is none, of neighbours an agent of the first flock perceives.
     neighbours: f64,
     steps: u64,
     ms_per_step: f64,
@@ -67,9 +70,13 @@ pub fn bench(args: &args::Bench) -> miette::Result<Outcome> {
     Ok(if finite { Outcome::Fine } else { Outcome::WentWrong })
 }
 
-/// The scene with a spacing that gives about so many fluid particles (bodies' where there is no fluid).
+/// The scene with a spacing that gives about so many fluid particles (bodies' where there is no fluid); with flocks alone, so many
+/// agents of as many neighbours as before.
 fn sized(scene: &Scene, wanted: u64) -> miette::Result<Scene> {
     let mut scene = scene.clone();
+    if scene.fluid.is_empty() && scene.rigid.is_empty() {
+        return Ok(crowded(scene, wanted));
+    }
     // once to scale, once more for the grain of the lattice
     for _ in 0..2 {
         let [fluid, rigid, _] = scene.assemble().map_err(|e| *e)?.state.particles.count;
@@ -80,6 +87,20 @@ fn sized(scene: &Scene, wanted: u64) -> miette::Result<Scene> {
         scene.resolution.spacing *= ratio.powf(1.0 / f64::from(scene.world.dimensions));
     }
     Ok(scene)
+}
+
+/// Flocks of so many agents in all, in the same space: radii shrink, so that each perceives as many as before.
+fn crowded(mut scene: Scene, wanted: u64) -> Scene {
+    let now: f64 = scene.flock.iter().map(|f| f64::from(f.count)).sum();
+    let ratio = wanted as f64 / now;
+    let factor = ratio.powf(-1.0 / f64::from(scene.world.dimensions));
+    for f in scene.flock.iter_mut().filter(|f| f.count > 1 && !matches!(f.shape, Shape::Points(_))) {
+        f.count = (f64::from(f.count) * ratio).round().max(1.0) as u32;
+        f.radius *= factor;
+        let radii = [&mut f.separation_radius, &mut f.alignment_radius, &mut f.cohesion_radius];
+        radii.into_iter().flatten().for_each(|r| *r *= factor);
+    }
+    scene
 }
 
 fn measure(name: &str, scene: &Scene, steps: u64, finite: &mut bool) -> miette::Result<Case> {
@@ -99,7 +120,8 @@ fn measure(name: &str, scene: &Scene, steps: u64, finite: &mut bool) -> miette::
     let wall = start.elapsed().as_secs_f64();
     bar.finish_and_clear();
     let count = world.state().particles.count;
-    let particles = count[Kind::Fluid as usize] + count[Kind::Rigid as usize];
+    let agents = world.state().agents.record.len();
+    let particles = count[Kind::Fluid as usize] + count[Kind::Rigid as usize] + agents;
     let mut stage_ms = StageMillis::since(&timers, &world);
     stage_ms.0.iter_mut().for_each(|s| s.1 /= steps as f64);
     Ok(Case {
@@ -107,7 +129,12 @@ fn measure(name: &str, scene: &Scene, steps: u64, finite: &mut bool) -> miette::
         backend: world.backend(),
         device: device(),
         particles,
-        neighbours: world.ledger().neighbours,
+        agents,
+        neighbours: if count[Kind::Fluid as usize] > 0 || agents == 0 {
+            world.ledger().neighbours
+        } else {
+            world.flock_neighbours(0)
+        },
         steps,
         ms_per_step: 1e3 * wall / steps as f64,
         particle_steps_per_s: particles as f64 * steps as f64 / wall,

@@ -21,6 +21,7 @@ struct Findings {
     static_particles: usize,
     bodies: usize,
     static_bodies: usize,
+    agents: usize,
     neighbours: f64,
     seconds: f64,
     dt: f64,
@@ -46,6 +47,7 @@ pub fn check(args: &args::Check) -> miette::Result<Outcome> {
     let mut scene = args.input.open()?;
     scene.solver.settle = 0.0;
     let world = World::from_scene(&scene).map_err(|e| *e)?;
+    jetsam::validate::check_scene(&scene, &world).map_err(|e| *e)?;
     let findings = find(&args.input.scene, &scene, &world);
     if args.json {
         print_json(&findings);
@@ -79,6 +81,7 @@ fn find(name: &str, scene: &Scene, world: &World) -> Findings {
         static_particles: count[Kind::Static as usize],
         bodies: bodies.len() - static_bodies,
         static_bodies,
+        agents: world.state().agents.record.len(),
         neighbours: ledger.neighbours,
         seconds: scene.run.seconds,
         dt,
@@ -122,6 +125,7 @@ fn describe(f: &Findings) -> String {
         ("scene", format!("{} ({})", f.scene, f.title)),
         ("particles", format!("{} fluid, {} rigid, {} static", f.fluid, f.rigid_particles, f.static_particles)),
         ("bodies", format!("{} rigid, {} static", f.bodies, f.static_bodies)),
+        ("agents", f.agents.to_string()),
         ("spacing", format!("{} m, support {} m, {:.1} neighbours", f.spacing, f.support, f.neighbours)),
         (
             "time step",

@@ -13,6 +13,7 @@ mod scenes;
 mod schema;
 mod shell;
 mod terminal;
+mod validate;
 mod voxelize;
 
 use args::{Args, Command};
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
         Command::Check(check) => check::check(&check),
         Command::Voxelize(voxelize) => voxelize::voxelize(&voxelize),
         Command::Bench(bench) => bench::bench(&bench),
+        Command::Validate(validate) => validate::validate(&validate),
         Command::Scenes(scenes) => scenes::scenes(&scenes),
         Command::Devices(devices) => devices::devices(&devices),
         Command::Schema => schema::schema(),

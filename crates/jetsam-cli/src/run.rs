@@ -28,7 +28,8 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     outputs.write(&world, &recorder.frame(&world, Duration::ZERO))?;
     for frame in 1..=times.count {
         let start = Instant::now();
-        world.advance(times.at(frame), |_, step| {
+        world.advance(times.at(frame), |world, step| {
+            outputs.step(world);
             trouble = step.trouble;
             trouble.is_none()
         });
@@ -91,11 +92,12 @@ fn describe(s: &Summary, folder: &Path) -> String {
         0 => String::new(),
         n => format!(", {n} bodies of {} particles", s.rigid_particles),
     };
+    let agents = if s.agents > 0 { format!(", {} agents", s.agents) } else { String::new() };
     let left = if s.left > 0 { format!(" ({} left through open sides)", s.left) } else { String::new() };
     table(&[
         ("real-time factor", format!("{:.3}  ({} in {})", s.real_time_factor, seconds(s.time), seconds(s.wall_s))),
         ("steps", format!("{}, mean {}{bound}", s.steps, seconds(s.dt))),
-        ("particles", format!("{} fluid{bodies}", s.fluid)),
+        ("particles", format!("{} fluid{bodies}{agents}", s.fluid)),
         (
             "density error",
             format!("mean {:.2} %, max {:.2} %", 100.0 * s.density_error_mean, 100.0 * s.density_error_max),

@@ -417,3 +417,73 @@ fn help_completions_and_man_page_are_there() {
     assert!(good(&dir, &["completions", "bash"]).contains("jetsam"));
     assert!(good(&dir, &["man"]).contains(".TH"));
 }
+
+/// A stone that falls 5 m in a second.
+const FALL: &str = r#"title = "A fall"
+[world]
+gravity = [0, 0, -10]
+[domain]
+min = [-1, -1, -9]
+max = [1, 1, 1]
+walls = ["open", "open", "open"]
+[resolution]
+spacing = 0.1
+[solver]
+dt = 0.01
+[run]
+seconds = 1
+[[rigid]]
+name = "stone"
+shape = { points = [[0, 0, 0]] }
+mass = 1
+[[probe]]
+name = "z, up"
+of = "position"
+body = "stone"
+component = "z"
+interval = 0.25
+[[expect]]
+probe = "z, up"
+time = 1
+value = -5
+tolerance = 1e-9
+source = "g t^2 / 2"
+"#;
+
+#[test]
+fn validate_judges_a_scene_by_its_exit_status() {
+    let dir = folder("validate");
+    let file = scene(&dir, FALL);
+    let rows = good(&dir, &["validate", &file, "--json", "--out", "report"]);
+    let row = json(rows.trim());
+    assert_keys(&row, "case variant what value reference tolerance reached verdict seconds source note");
+    assert_eq!((&row["verdict"], &row["value"], &row["case"]), (&"ok".into(), &(-5.0).into(), &"scene".into()));
+    let table = good(&dir, &["validate", &file]);
+    assert!(table.contains("A fall") && table.contains("z, up at 1 s"), "{table}");
+    let markdown = std::fs::read_to_string(dir.join("report/validation.md")).unwrap();
+    assert!(markdown.contains("| z, up at 1 s | -5 |") && markdown.contains("scene.svg"), "{markdown}");
+    assert!(std::fs::read_to_string(dir.join("report/scene.svg")).unwrap().contains("</svg>"));
+    let readings = std::fs::read_to_string(dir.join("report/scene.csv")).unwrap();
+    assert_eq!(readings.lines().count(), 1 + 5, "{readings}");
+
+    let wrong = jetsam(&dir, &["validate", &file, "--set", "expect.0.value=-4"]);
+    assert_eq!(wrong.status.code(), Some(1), "{}", text(&wrong.stderr));
+    assert!(text(&wrong.stdout).contains("FAIL"));
+    bad(&dir, &["validate", &file, "--set", "expect.0.probe=x"], &["no probe `x`"]);
+    bad(&dir, &["validate", "B99"], &["no validation case `B99`", "--list"]);
+    bad(&dir, &["check", &scene(&dir, &FALL.replace("tolerance = 1e-9", "")), "--json"], &["how far", "scene.toml:"]);
+    let listed = good(&dir, &["validate", "--list"]);
+    assert!(listed.contains("B2-free-fall") && listed.contains("A1-kernels"), "{listed}");
+}
+
+#[test]
+fn a_run_writes_what_probes_read() {
+    let dir = folder("probes");
+    let file = scene(&dir, FALL);
+    good(&dir, &["run", &file, "--headless", "--save", "csv", "--out", "."]);
+    let csv = std::fs::read_to_string(dir.join("probes.csv")).unwrap();
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!((lines[0], lines[1], lines.len()), ("time,probe,value", "0,\"z, up\",0", 6));
+    let last: f64 = lines[5].rsplit(',').next().unwrap().parse().unwrap();
+    assert!((last + 5.0).abs() < 1e-9, "{csv}");
+}

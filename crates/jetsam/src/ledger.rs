@@ -15,6 +15,8 @@ pub struct Ledger {
     pub momentum: DVec3,
     /// Sum of the magnitudes of the momenta of particles and bodies (kg m/s).
     pub momentum_scale: f64,
+    /// Momentum of fluid that came in by sources, less that of fluid that left or was drained, in this step (kg m/s).
+    pub crossed: DVec3,
     /// Force from outside: walls, static bodies, gravity, fields (N).
     pub external_force: DVec3,
     /// Impulse of this step by joints to what does not move (N s).
@@ -37,6 +39,10 @@ pub struct Ledger {
     pub fluid: usize,
     /// Fluid particles that passed an open side, since the beginning.
     pub left: u64,
+    /// Fluid particles given by sources, since the beginning.
+    pub born: u64,
+    /// Fluid particles taken by sinks or the end of their lifetime, since the beginning.
+    pub drained: u64,
     /// Fluid particles that got through a solid wall, since the beginning.
     pub lost: u64,
     /// Particles of rigid bodies that are now beyond a solid wall.

@@ -29,6 +29,7 @@
 //! | pressure | equation of state (E3) | [`interact::pressure`] |
 //! | boundary | what fluids show to bodies and walls (E17) | [`interact::boundary`] |
 //! | forces | all pairs (E4-E6, E10-E12, E16, E30) | [`interact::forces`] |
+//! | agents | flocks move, decide and push (E22-E28) | [`mod@flock`] |
 //! | bodies | force and torque of each body (E18) | [`integrate::bodies`] |
 //! | kick | the second half of the kick (E20) | [`integrate`] |
 //! | ledger | momentum, energy, what was lost, what bounds the next step | [`ledger`] |
@@ -38,6 +39,8 @@
 pub mod assemble;
 pub mod backend;
 pub mod error;
+pub mod flock;
+pub mod formula;
 pub mod gpu;
 pub mod integrate;
 pub mod interact;
@@ -46,11 +49,13 @@ pub mod ledger;
 pub mod mesh;
 pub mod model;
 pub mod params;
+pub mod probe;
 pub mod random;
 pub mod report;
 pub mod scene;
 pub mod stage;
 pub mod state;
+pub mod validate;
 pub mod voxelize;
 pub mod world;
 

@@ -1,11 +1,14 @@
 //! What does not change while a world runs: constants derived from the scene.
 
+use crate::flock::FlockConstants;
+use crate::integrate::sources::{Drain, Source};
 use crate::interact::cells::Grid;
 use crate::laws::kernel::{Kernel, KernelSet};
 use crate::scene::joint::JointModel;
 use crate::scene::motion::{Path, Shake};
-use crate::scene::{Force, Solver};
-use glam::DVec3;
+use crate::scene::{Density, Force, Solver, Viscosity};
+use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
 
 /// Constants of a world.
 #[derive(Clone, Debug)]
@@ -24,6 +27,8 @@ pub struct Model {
     pub factors: Factors,
     /// Fluids, in the order of the scene.
     pub fluids: Vec<FluidModel>,
+    /// Flocks, in the order of the scene.
+    pub flocks: Vec<FlockConstants>,
     /// Contact numbers of each body, in the order of [`crate::state::Bodies`].
     pub contacts: Vec<ContactModel>,
     /// Largest speed the scene can reach (m/s), from depth, drop height and velocities.
@@ -32,6 +37,12 @@ pub struct Model {
     pub sound_speed: f64,
     /// Gravity (m/s^2).
     pub gravity: DVec3,
+    /// Sources of fluid (E31).
+    pub sources: Vec<Source>,
+    /// Sinks (E31).
+    pub drains: Vec<Drain>,
+    /// Seed of everything random.
+    pub seed: u64,
     /// Fields besides gravity (E30).
     pub fields: Vec<Force>,
     /// Shaking of the scene, felt with gravity.
@@ -48,6 +59,8 @@ pub struct Model {
     pub solver: Solver,
     /// Bounds of the time step that do not change (s): each with its name.
     pub dt_bounds: Vec<(DtBound, f64)>,
+    /// Whether walls and bodies show viscosity the fluid's velocity mirrored (Adami et al. 2012).
+    pub no_slip: bool,
     /// Number of neighbours inside a full support, about: `4/3 pi (H/dx)^3`, or `pi (H/dx)^2`.
     pub full_support: f64,
     /// What was repaired or looks doubtful.
@@ -59,6 +72,10 @@ pub struct Model {
 pub struct Factors {
     /// From the density kernel's `w(s)` to `W` (1/m^d): a resting lattice has density `rho_0` exactly.
     pub w: f32,
+    /// `W` at the distance of one spacing (1/m^d).
+    pub w_spacing: f32,
+    /// `W` at no distance (1/m^d).
+    pub w_own: f32,
     /// From the force kernel's `g(s)` to `G = (1/r) dW/dr` (1/m^(d+2)): the gradient of a linear field on a lattice
     /// is exact, and with it the Laplacian of E5.
     pub g: f32,
@@ -74,8 +91,56 @@ impl Factors {
         let g = force.norm(dimensions) / support.powi(d + 2) / force.lattice_gradient(spacings, dimensions);
         let laplacian = Kernel::laplacian_norm(dimensions) / support.powi(d + 2);
         let laplacian = laplacian / Kernel::lattice_laplacian(spacings, dimensions);
-        Self { w: w as f32, g: g as f32, laplacian: laplacian as f32 }
+        let at = |s: f64| w as f32 * density.w(s as f32);
+        Self { w: w as f32, w_spacing: at(1.0 / spacings), w_own: at(0.0), g: g as f32, laplacian: laplacian as f32 }
     }
+}
+
+/// Surface tension that a cohesion of strength 1 gives a flat, sharp surface: the work of parting two half spaces is
+/// `pi / 8 H^5 int c(s) s^4 ds` in 3D and `H^4 / 3 int c(s) s^3 ds` in 2D (after Fowler 1937).
+pub fn cohesion_moment(support: f64, dimensions: u32) -> f64 {
+    let power = dimensions as i32 + 1;
+    let factor = if dimensions == 2 { 1.0 / 3.0 } else { PI / 8.0 };
+    factor * support.powi(power + 1) * moment(power)
+}
+
+/// Surface tension that a curvature term of strength 1 gives (E7). In a fluid of even density the term is the gradient of a pair
+/// potential, the difference of `W` smeared over a ball of radius `H` and of `W` times the ball's volume: of such a potential
+/// `u` the surface tension is the mean of `|x| u` over all space, over `2 pi` in 2D and over 8 in 3D.
+pub fn curvature_moment(kernel: Kernel, support: f64, dimensions: u32) -> f64 {
+    const PARTS: u32 = 64;
+    let middles = || (0..PARTS).map(|k| (f64::from(k) + 0.5) / f64::from(PARTS));
+    let flat = dimensions == 2;
+    let (ball, shell) = if flat { (PI, 2.0 * PI) } else { (4.0 / 3.0 * PI, 4.0 * PI) };
+    let shell_at = |s: f64| shell * if flat { s } else { s * s } / f64::from(PARTS);
+    // mean of |x + y| over the directions of y, |x| = r and |y| = s
+    let apart = |r: f64, s: f64| {
+        let at = |cosine: f64| (r * r + s * s + 2.0 * r * s * cosine).max(0.0).sqrt();
+        middles().map(|t| if flat { at((PI * t).cos()) } else { at(2.0 * t - 1.0) }).sum::<f64>() / f64::from(PARTS)
+    };
+    let mut moment = 0.0;
+    for s in middles() {
+        let weight = kernel.value(s, 1.0, dimensions) * shell_at(s);
+        moment -= ball * weight * s;
+        moment += weight * middles().map(|r| shell_at(r) * apart(r, s)).sum::<f64>();
+    }
+    moment * support.powi(dimensions as i32 + 2) / if flat { 2.0 * PI } else { 8.0 }
+}
+
+/// Pressure that a cohesion of strength 1 puts on the inside of a fluid, by the virial: `2 pi / 3 H^4 int c(s) s^3 ds` in 3D,
+/// `pi / 2 H^3 int c(s) s^2 ds` in 2D.
+pub fn cohesion_pressure(support: f64, dimensions: u32) -> f64 {
+    let power = dimensions as i32;
+    let factor = if dimensions == 2 { 0.5 } else { 2.0 / 3.0 } * PI;
+    factor * support.powi(power + 1) * moment(power)
+}
+
+/// `int_0^1 c(s) s^power ds` of the cohesion's shape.
+fn moment(power: i32) -> f64 {
+    const PARTS: u32 = 1000;
+    let middle = |k: u32| (f64::from(k) + 0.5) / f64::from(PARTS);
+    let c = |s: f64| f64::from(crate::laws::fluid::cohesion_shape(s as f32));
+    (0..PARTS).map(middle).map(|s| c(s) * s.powi(power)).sum::<f64>() / f64::from(PARTS)
 }
 
 /// Constants of a fluid.
@@ -93,6 +158,14 @@ pub struct FluidModel {
     pub stiffness: f32,
     /// `alpha rho_0 c_0 h` (Pa s), E5.
     pub artificial: f32,
+    /// Strength of cohesion (N/m^(2d); E7).
+    pub cohesion: f32,
+    /// Strength of the curvature term (N/m^(2d); E7).
+    pub curvature: f32,
+    /// How long a particle lives (s); infinite unless the scene says.
+    pub lifetime: f64,
+    /// `delta h c_0 / stiffness` (m^2/s/Pa), E1.
+    pub diffusion: f32,
 }
 
 /// Contact numbers of a body (E14).
@@ -132,6 +205,8 @@ pub enum DtBound {
     Contact,
     /// The fastest body moves a tenth of the contact diameter.
     Travel,
+    /// A quarter of the smallest radius of a flock, or its next decision.
+    Flock,
     /// The scene's own `dt`.
     Scene,
     /// The end of a frame.
@@ -147,6 +222,7 @@ impl DtBound {
             DtBound::Viscosity => "viscosity",
             DtBound::Contact => "contact",
             DtBound::Travel => "travel",
+            DtBound::Flock => "flock",
             DtBound::Scene => "scene",
             DtBound::Frame => "frame",
         }
@@ -159,6 +235,17 @@ const TANGENTIAL: f32 = 2.0 / 7.0;
 const TANGENTIAL_DAMPING: f32 = 0.3;
 
 impl Model {
+    /// Whether the pairs of fluids have no laws but pressure and viscosity (E4, E5 without Mueller's form).
+    pub fn plain(&self) -> bool {
+        let s = &self.solver;
+        s.density == Density::Summation
+            && s.viscosity != Viscosity::Mueller
+            && s.xsph == 0.0
+            && s.shifting == 0.0
+            && s.vorticity == 0.0
+            && self.fluids.iter().all(|f| f.cohesion == 0.0 && f.curvature == 0.0)
+    }
+
     /// `1 / H`.
     pub fn inverse_support(&self) -> f32 {
         (1.0 / self.support) as f32
@@ -216,6 +303,16 @@ impl Model {
         let k_t = TANGENTIAL * k;
         let eta_t = part * crate::laws::contact::dashpot(TANGENTIAL_DAMPING, k_t / part * n, mass) / n;
         (k_t, eta_t, mu)
+    }
+
+    /// Whether colour gradients or vorticities are wanted (E7, E8).
+    pub fn wants_gradients(&self) -> bool {
+        self.fluids.iter().any(|f| f.curvature > 0.0) || self.solver.vorticity > 0.0
+    }
+
+    /// Gravity in single precision.
+    pub fn gravity_f32(&self) -> Vec3 {
+        self.gravity.as_vec3()
     }
 
     /// Spring constant (N/m) and dashpot (N s/m) of one contact between particles of bodies `a` and `b` (E14).
@@ -284,6 +381,22 @@ impl Model {
         let (k, _) = self.contact_pair(a as u32, a as u32);
         let mass = 0.5 / f64::from(c.inverse_mass);
         std::f64::consts::PI * (mass / (f64::from(k) * f64::from(sharers))).sqrt()
+    }
+
+    /// Takes over the flocks and what they ask of the time step: to be smooth, and not to pass a body within a step.
+    pub fn add_flocks(&mut self, flocks: Vec<FlockConstants>) {
+        let meet_bodies = !self.contacts.is_empty();
+        let mut dt = f64::INFINITY;
+        for flock in &flocks {
+            dt = dt.min(flock.largest_dt());
+            if meet_bodies {
+                dt = dt.min(0.5 * self.spacing / f64::from(flock.limits.fastest));
+            }
+        }
+        if dt.is_finite() {
+            self.dt_bounds.push((DtBound::Flock, dt));
+        }
+        self.flocks = flocks;
     }
 
     /// Largest time step allowed now and what bounds it (E29), from the largest speed (m/s) and acceleration (m/s^2).

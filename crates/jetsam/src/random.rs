@@ -1,5 +1,10 @@
 //! Random numbers by counter: a value depends on its seed, stream and index alone, never on who asks first.
 
+/// Sixty-four random bits, for a seed of its own.
+pub fn word(seed: u64, stream: u64, index: u64) -> u64 {
+    mix(seed, stream, index)
+}
+
 /// Mixes three words into one (the finaliser of SplitMix64, applied in turn).
 fn mix(seed: u64, stream: u64, index: u64) -> u64 {
     let mut z = 0u64;

@@ -112,7 +112,7 @@ impl Recorder {
             fluid: ledger.fluid,
             rigid_particles: world.state().bodies.rigid_slots,
             bodies: rigid_bodies(world.state()),
-            agents: 0,
+            agents: world.state().agents.record.len(),
             lost: ledger.lost + ledger.rigid_lost as u64,
             fast_contacts: ledger.fast_contacts,
             nonfinite: ledger.nonfinite,
@@ -149,6 +149,7 @@ impl Recorder {
             fluid: ledger.fluid,
             rigid_particles: world.state().bodies.rigid_slots,
             bodies: rigid_bodies(world.state()),
+            agents: world.state().agents.record.len(),
             left: ledger.left,
             lost: ledger.lost + ledger.rigid_lost as u64,
             fast_contacts: ledger.fast_contacts,
@@ -182,6 +183,8 @@ pub struct Summary {
     pub rigid_particles: usize,
     /// Rigid bodies; static ones do not count.
     pub bodies: usize,
+    /// Agents of flocks.
+    pub agents: usize,
     /// Fluid particles that passed an open side.
     pub left: u64,
     /// As in [`FrameStats`].
@@ -204,8 +207,8 @@ pub struct Summary {
     pub state_hash: String,
 }
 
-/// A hash (FNV-1a, 64 bits) of the bits of every fluid particle's position and velocity in the order of their ids, and of every
-/// body's place, velocity, orientation and angular velocity: equal when two states are the same to the last bit.
+/// A hash (FNV-1a, 64 bits) of the bits of every fluid particle's and agent's position and velocity in the order of their ids, and of
+/// every body's place, velocity, orientation and angular velocity: equal when two states are the same to the last bit.
 pub fn state_hash(state: &State) -> u64 {
     let p = &state.particles;
     let mut order: Vec<(u32, usize)> = p.segment(Kind::Fluid).map(|i| (p.id[i], i)).collect();
@@ -219,6 +222,12 @@ pub fn state_hash(state: &State) -> u64 {
     for body in &state.bodies.body {
         let numbers = [body.x.to_array(), body.v.to_array(), body.omega.to_array()];
         numbers.iter().flatten().chain(&body.q.to_array()).for_each(|x| add(&mut hash, &x.to_bits().to_le_bytes()));
+    }
+    let a = &state.agents;
+    let mut order: Vec<(u32, usize)> = a.id.iter().copied().zip(0..).collect();
+    order.sort_unstable();
+    for (_, i) in order {
+        a.record[i].x.iter().chain(&a.record[i].v).for_each(|x| add(&mut hash, &x.to_bits().to_le_bytes()));
     }
     hash
 }

@@ -8,6 +8,8 @@ use serde::Serialize;
 pub enum Stage {
     /// Half a kick and the drift of every particle and body; velocities are predicted to the step's end.
     Drift,
+    /// Fluid born and drained (E31).
+    Sources,
     /// Particles sorted into cells as wide as the support.
     Cells,
     /// Neighbours found once for all laws; densities of fluids (E1).
@@ -16,8 +18,12 @@ pub enum Stage {
     Pressure,
     /// Pressures the fluid shows to the particles of bodies (E17).
     Boundary,
+    /// Colour gradients and vorticities, where surface tension or vorticity ask for them (E7, E8).
+    Gradients,
     /// Forces on every particle (E4-E6, E10-E12, E16, E30).
     Forces,
+    /// Agents of flocks move and decide; what they exert on fluids and bodies (E22-E28).
+    Agents,
     /// Force and torque summed per body (E18).
     Bodies,
     /// The second half of the kick.
@@ -28,13 +34,16 @@ pub enum Stage {
 
 impl Stage {
     /// The order of a step of weakly compressible SPH.
-    pub const WCSPH: [Stage; 9] = [
+    pub const WCSPH: [Stage; 12] = [
         Stage::Drift,
+        Stage::Sources,
         Stage::Cells,
         Stage::Density,
         Stage::Pressure,
         Stage::Boundary,
+        Stage::Gradients,
         Stage::Forces,
+        Stage::Agents,
         Stage::Bodies,
         Stage::Kick,
         Stage::Ledger,
@@ -44,11 +53,14 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Stage::Drift => "drift",
+            Stage::Sources => "sources",
             Stage::Cells => "cells",
             Stage::Density => "density",
             Stage::Pressure => "pressure",
             Stage::Boundary => "boundary",
+            Stage::Gradients => "gradients",
             Stage::Forces => "forces",
+            Stage::Agents => "agents",
             Stage::Bodies => "bodies",
             Stage::Kick => "kick",
             Stage::Ledger => "ledger",
@@ -57,6 +69,6 @@ impl Stage {
 
     /// Whether the stage evaluates forces at the present positions: what has to run once before the first step.
     pub fn evaluates(self) -> bool {
-        !matches!(self, Stage::Drift | Stage::Kick)
+        !matches!(self, Stage::Drift | Stage::Sources | Stage::Kick)
     }
 }

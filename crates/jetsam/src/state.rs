@@ -69,12 +69,22 @@ pub struct Particles {
     pub push: Vec<[f32; 3]>,
     /// Acceleration of the step before (m/s^2), fluid only. Kept by cells for the kick.
     pub push_before: Vec<[f32; 3]>,
-    /// Relative density `D = rho / rho_0`, fluid only. Written by density.
+    /// Relative density `D = rho / rho_0`, fluid only. Written by density, or where it is integrated by drift and kick.
     pub density: Vec<f32>,
     /// Of what the forces on bodies' particles consist, from the first rigid particle on. Written by forces.
     pub touch: Vec<Touch>,
-    /// Velocity added by XSPH (m/s), fluid only; empty when XSPH is off. Written by forces.
-    pub carry: Vec<[f32; 3]>,
+    /// `dD/dt` one and two steps ago (1/s), fluid only; empty where densities are summed. Written by drift.
+    pub rate: Vec<[f32; 2]>,
+    /// Velocity added by XSPH and shifting (m/s) and, last, `dD/dt` now (1/s), fluid only; empty when none of them is on.
+    /// Written by forces.
+    pub carry: Vec<[f32; 4]>,
+    /// Colour gradient times `H` and, last, `|curl v|` (1/s), fluid only; empty where neither is asked for. Written by gradients.
+    pub gradient: Vec<[f32; 4]>,
+    /// `curl v` (1/s), written by gradients; then the acceleration of vorticity confinement (m/s^2), written by forces.
+    /// Fluid only; empty as `gradient`.
+    pub vorticity: Vec<[f32; 3]>,
+    /// When a particle was born (s), fluid only; empty where no fluid has a lifetime. Written by sources, permuted by cells.
+    pub born: Vec<f32>,
     /// Fluid: identity, counted over all fluids from 0. Bodies: slot in [`Bodies`]. Permuted by cells.
     pub id: Vec<u32>,
     /// Index of the fluid or of the body the particle belongs to. Permuted by cells.
@@ -90,6 +100,62 @@ impl Particles {
     pub fn segment(&self, kind: Kind) -> Range<usize> {
         let first = self.first[kind as usize];
         first..first + self.count[kind as usize]
+    }
+
+    /// Adds a fluid particle born at `time` (s). Where there is no place left, the segment is enlarged by half: the segments of bodies
+    /// move up, and their particles must be copied anew.
+    pub fn append(&mut self, record: Record, id: u32, owner: u32, time: f64) {
+        let at = self.count[Kind::Fluid as usize];
+        if at == self.first[Kind::Rigid as usize] {
+            self.grow((at / 2).max(1024));
+        }
+        self.record[at] = record;
+        self.id[at] = id;
+        self.owner[at] = owner;
+        self.push[at] = [0.0; 3];
+        self.push_before[at] = [0.0; 3];
+        self.density[at] = 1.0;
+        if let Some(rate) = self.rate.get_mut(at) {
+            *rate = [0.0; 2];
+        }
+        if let Some(carry) = self.carry.get_mut(at) {
+            *carry = [0.0; 4];
+        }
+        if let Some(born) = self.born.get_mut(at) {
+            *born = time as f32;
+        }
+        self.count[Kind::Fluid as usize] += 1;
+    }
+
+    fn grow(&mut self, more: usize) {
+        let (old, total) = (self.first[Kind::Rigid as usize], self.record.len() + more);
+        self.record.resize(total, Record::default());
+        self.push.resize(total, [0.0; 3]);
+        self.id.resize(total, 0);
+        self.owner.resize(total, 0);
+        let end = total - more;
+        self.record.copy_within(old..end, old + more);
+        self.push.copy_within(old..end, old + more);
+        self.id.copy_within(old..end, old + more);
+        self.owner.copy_within(old..end, old + more);
+        let capacity = old + more;
+        self.push_before.resize(capacity, [0.0; 3]);
+        self.density.resize(capacity, 1.0);
+        if !self.born.is_empty() {
+            self.born.resize(capacity, 0.0);
+        }
+        if !self.gradient.is_empty() {
+            self.gradient.resize(capacity, [0.0; 4]);
+            self.vorticity.resize(capacity, [0.0; 3]);
+        }
+        if !self.rate.is_empty() {
+            self.rate.resize(capacity, [0.0; 2]);
+        }
+        if !self.carry.is_empty() {
+            self.carry.resize(capacity, [0.0; 4]);
+        }
+        self.first[Kind::Rigid as usize] += more;
+        self.first[Kind::Static as usize] += more;
     }
 
     /// Number of living particles of all kinds.
@@ -196,6 +262,32 @@ pub struct Bodies {
     pub rigid_slots: usize,
 }
 
+/// Agents of all flocks, flock by flock; inside a flock in the order of cells, ties by id.
+#[derive(Clone, Debug, Default)]
+pub struct Agents {
+    /// Position and velocity; the other two numbers are not used. Written by agents.
+    pub record: Vec<Record>,
+    /// Identity, counted over all flocks from 0. Permuted by agents.
+    pub id: Vec<u32>,
+    /// What was decided: steering (m/s^2) of Reynolds' agents, else the velocity to come (m/s). Written by agents.
+    pub next: Vec<[f32; 3]>,
+    /// Force of fluids and bodies on the agent (N): E27, E28. Written by agents.
+    pub force: Vec<[f32; 3]>,
+    /// Time of each flock. Written by agents.
+    pub clock: Vec<Clock>,
+}
+
+/// Time as a flock counts it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Clock {
+    /// Time since the beginning (s).
+    pub time: f64,
+    /// Time until the next decision (s).
+    pub wait: f64,
+    /// Decisions made.
+    pub decisions: u64,
+}
+
 /// The whole changing state of a world.
 #[derive(Clone, Debug, Default)]
 pub struct State {
@@ -203,4 +295,6 @@ pub struct State {
     pub particles: Particles,
     /// Bodies.
     pub bodies: Bodies,
+    /// Agents of flocks.
+    pub agents: Agents,
 }

@@ -3,6 +3,7 @@
 use crate::assemble::Assembly;
 use crate::backend::{Backend, Cpu};
 use crate::error::Result;
+use crate::flock::Order;
 use crate::integrate::Advance;
 use crate::ledger::Ledger;
 use crate::mesh::Mesh;
@@ -21,6 +22,7 @@ pub struct World {
     meshes: Vec<Option<(Arc<Mesh>, DVec3)>>,
     time: f64,
     steps: u64,
+    dt_before: f64,
     timers: [Duration; Stage::WCSPH.len()],
     bound_by: Vec<(DtBound, u64)>,
     momentum: MomentumLedger,
@@ -83,6 +85,7 @@ impl World {
             meshes,
             time: 0.0,
             steps: 0,
+            dt_before: 0.0,
             timers: Default::default(),
             bound_by: Vec::new(),
             momentum: MomentumLedger::default(),
@@ -98,12 +101,13 @@ impl World {
     /// One step, no longer than `longest` (s).
     pub fn step(&mut self, longest: f64) -> StepReport {
         let (dt, bound) = self.next_dt(longest);
-        let advance = Advance { dt, time: self.time + dt, drag: 0.0 };
+        let advance = Advance { time: self.time, dt, dt_before: self.dt_before, drag: 0.0 };
         for (stage, timer) in Stage::WCSPH.into_iter().zip(&mut self.timers) {
             let start = Instant::now();
             self.backend.run(stage, &self.model, advance);
             *timer += start.elapsed();
         }
+        self.dt_before = dt;
         self.time += dt;
         self.steps += 1;
         self.record(dt, bound)
@@ -132,14 +136,25 @@ impl World {
         if travel < dt && self.model.solver.dt.is_none() {
             (dt, bound) = (travel, DtBound::Travel);
         }
+        let (longest, end) = self.next_end(longest);
         if dt >= longest {
-            return (longest, DtBound::Frame);
+            return (longest, end);
         }
         if longest == f64::INFINITY {
             return (dt, bound);
         }
-        // whole steps: what is left is cut evenly, so that no sliver of a step remains
-        (longest / (longest / dt).ceil(), bound)
+        // whole steps: what is left is cut evenly, so that no sliver of a step remains, nor one more for a rounding error
+        (longest / (longest / dt * (1.0 - 1e-9)).ceil(), bound)
+    }
+
+    /// Where a step has to end at the latest: at the end of what was asked, or where a flock decides.
+    fn next_end(&self, longest: f64) -> (f64, DtBound) {
+        let clocks = self.state().agents.clock.iter().zip(&self.model.flocks);
+        let waits = clocks.filter(|(_, flock)| flock.tau > 0.0).map(|(clock, _)| clock.wait);
+        match waits.fold(f64::INFINITY, f64::min) {
+            wait if wait < longest => (wait, DtBound::Flock),
+            _ => (longest, DtBound::Frame),
+        }
     }
 
     /// Runs the stages that evaluate forces.
@@ -162,9 +177,11 @@ impl World {
         let mut time = 0.0;
         while time < end {
             let (dt, _) = self.next_dt(end - time);
+            let advance = Advance { time: 0.0, dt, dt_before: self.dt_before, drag };
             for stage in Stage::WCSPH {
-                self.backend.run(stage, &self.model, Advance { dt, drag, time: 0.0 });
+                self.backend.run(stage, &self.model, advance);
             }
+            self.dt_before = dt;
             time += dt;
         }
     }
@@ -176,12 +193,12 @@ impl World {
             None => self.bound_by.push((bound, 1)),
         }
         self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force);
-        self.momentum.impulse += ledger.external_impulse;
+        self.momentum.impulse += ledger.crossed + ledger.external_impulse;
         self.momentum.force = ledger.external_force;
         let (at_rest, _) = self.model.largest_dt(0.0, 0.0);
         let trouble = if ledger.nonfinite > 0 || !dt.is_finite() {
             Some(Trouble::NotFinite)
-        } else if bound != DtBound::Frame && dt < STALLED * at_rest {
+        } else if !matches!(bound, DtBound::Frame | DtBound::Flock) && dt < STALLED * at_rest {
             Some(Trouble::Stalled)
         } else {
             None
@@ -203,6 +220,16 @@ impl World {
     pub fn fluid(&self) -> impl Iterator<Item = &Record> {
         let particles = &self.state().particles;
         particles.record[particles.segment(Kind::Fluid)].iter()
+    }
+
+    /// How ordered the flock number `flock` is.
+    pub fn flock_order(&self, flock: usize) -> Order {
+        Order::of(&self.model, &self.state().agents, flock)
+    }
+
+    /// Mean number of others within the radius of an agent of the flock number `flock`; of topological neighbours their number.
+    pub fn flock_neighbours(&self, flock: usize) -> f64 {
+        crate::flock::neighbours(&self.model, &self.state().agents, flock)
     }
 
     /// What the last step left behind.

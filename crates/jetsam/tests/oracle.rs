@@ -7,6 +7,7 @@ use glam::{DMat3, DVec3};
 use jetsam::World;
 use jetsam::assemble::Assembly;
 use jetsam::random;
+use jetsam::scene::Density;
 use jetsam::state::Kind;
 use std::f64::consts::PI;
 
@@ -16,6 +17,8 @@ struct P {
     x: DVec3,
     v: DVec3,
     volume: f64,
+    /// Where densities are integrated.
+    density: f64,
     /// Inverse mass of what it belongs to: its own for fluid, the body's for bodies.
     inverse_mass: f64,
 }
@@ -49,14 +52,16 @@ fn calibration(a: f64, norm: f64, flat: bool) -> (f64, f64) {
     (s, c)
 }
 
-/// Density and acceleration of every fluid particle, force on every particle of bodies, by all pairs.
+/// Density, its rate and acceleration of every fluid particle, force on every particle of bodies, by all pairs.
 struct Oracle {
     density: Vec<f64>,
+    rate: Vec<f64>,
     force: Vec<DVec3>,
 }
 
 fn oracle(particles: &[P], assembly: &Assembly, period: DVec3) -> Oracle {
     let m = &assembly.model;
+    let integrated = m.solver.density == Density::Continuity;
     let flat = m.dimensions == 2;
     let norm = if flat { 7.0 / PI } else { 21.0 / (2.0 * PI) };
     let h = m.support;
@@ -77,22 +82,53 @@ fn oracle(particles: &[P], assembly: &Assembly, period: DVec3) -> Oracle {
     let (rho, stiffness) = (f64::from(fluid.density), f64::from(fluid.stiffness));
     let n = particles.len();
     let mut density = vec![1.0; n];
-    let mut share = vec![0.0; n];
+    let mut seen: Vec<DVec3> = particles.iter().map(|p| p.v).collect();
+    let (mut share, mut signed) = (vec![0.0; n], vec![0.0; n]);
     for (i, p) in particles.iter().enumerate().filter(|(_, p)| p.kind == Kind::Fluid) {
-        density[i] = particles.iter().map(|q| q.volume * w(apart(p, q).length())).sum();
-        let pressure = (stiffness / 7.0 * (density[i].powi(7) - 1.0)).max(0.0);
-        share[i] = pressure / density[i].powi(2);
+        density[i] = match integrated {
+            true => p.density,
+            false => particles.iter().map(|q| q.volume * w(apart(p, q).length())).sum(),
+        };
+        signed[i] = stiffness / 7.0 * (density[i].powi(7) - 1.0) / density[i].powi(2);
+        share[i] = signed[i].max(0.0);
     }
     for (i, p) in particles.iter().enumerate().filter(|(_, p)| p.kind != Kind::Fluid) {
-        let (mut total, mut weight) = (0.0, 0.0);
+        let (mut total, mut weight, mut flow) = (0.0, 0.0, DVec3::ZERO);
         for (j, q) in particles.iter().enumerate().filter(|(_, q)| q.kind == Kind::Fluid) {
             let e = apart(p, q);
             total += w(e.length()) * (share[j] - rho * m.gravity.dot(e));
             weight += w(e.length());
+            flow += w(e.length()) * q.v;
         }
+        // no slip: what viscosity sees is the fluid's velocity, mirrored at the body's
+        seen[i] = if weight > 0.0 { 2.0 * p.v - flow / weight } else { p.v };
         share[i] = if weight > 0.0 { (total / weight).max(0.0) } else { 0.0 };
     }
+    assert!(m.no_slip || particles.iter().all(|p| p.kind == Kind::Fluid));
     let softening = 0.01 * (0.5 * h).powi(2);
+    // continuity and, among fluids, diffusion of the excess over what rest under gravity asks for
+    let rate = (0..n)
+        .map(|i| {
+            let p = &particles[i];
+            let mut total = 0.0;
+            for (j, q) in particles.iter().enumerate().filter(|&(j, _)| j != i && p.kind == Kind::Fluid) {
+                let e = apart(p, q);
+                let r = e.length();
+                if r >= h {
+                    continue;
+                }
+                let gradient = -slope(r) / r * e;
+                total += q.volume * (p.v - q.v).dot(gradient);
+                if q.kind == Kind::Fluid {
+                    let squeezed = 0.5 * (signed[i] + signed[j]) / stiffness;
+                    let excess = signed[j] - signed[i] - rho * m.gravity.dot(e) * (1.0 - 3.0 * squeezed);
+                    let psi = 2.0 * excess / stiffness * e / (r * r);
+                    total += m.solver.density_diffusion * 0.5 * h * m.sound_speed * q.volume * psi.dot(gradient);
+                }
+            }
+            total
+        })
+        .collect();
     let force = (0..n)
         .map(|i| {
             let p = &particles[i];
@@ -110,7 +146,7 @@ fn oracle(particles: &[P], assembly: &Assembly, period: DVec3) -> Oracle {
                 f -= volumes * (share[i] + share[j]) * gradient;
                 // Morris: mu_i + mu_j, walls take the fluid's
                 let mu = 2.0 * f64::from(fluid.viscosity);
-                f += volumes * mu * e.dot(gradient) / (r * r + softening) * v;
+                f += volumes * mu * e.dot(gradient) / (r * r + softening) * (seen[j] - seen[i]);
                 if fluids == 1 && r < m.spacing && share[if p.kind == Kind::Fluid { i } else { j }] <= 0.0 {
                     // E16 for spray: k = m* (u / overlap)^2, eta = 2 zeta sqrt(k m*), restitution 0.3, along the normal
                     let reduced = 1.0 / (p.inverse_mass + q.inverse_mass);
@@ -128,7 +164,7 @@ fn oracle(particles: &[P], assembly: &Assembly, period: DVec3) -> Oracle {
             f
         })
         .collect();
-    Oracle { density, force }
+    Oracle { density, rate, force }
 }
 
 /// Runs the library's evaluation on an assembly and compares density and forces with the oracle.
@@ -154,6 +190,7 @@ fn compare(text: &str, disturb: impl Fn(&mut Assembly), period: DVec3) {
                 x: DVec3::from(r.x.map(f64::from)),
                 v: DVec3::from(r.v.map(f64::from)),
                 volume: r.volume.into(),
+                density: p.density.get(i).map_or(1.0, |&d| d.into()),
                 inverse_mass,
             }
         })
@@ -164,7 +201,8 @@ fn compare(text: &str, disturb: impl Fn(&mut Assembly), period: DVec3) {
     let world = World::new(make());
     let got = &world.state().particles;
     let largest = expected.force.iter().map(|f| f.length()).fold(1e-30, f64::max);
-    let mut seen = 0;
+    let fastest_rate = expected.rate.iter().map(|r| r.abs()).fold(1e-30, f64::max);
+    let mut checked = 0;
     for kind in Kind::ALL {
         let first = p.first[kind as usize];
         for i in got.segment(kind) {
@@ -178,11 +216,15 @@ fn compare(text: &str, disturb: impl Fn(&mut Assembly), period: DVec3) {
             if kind == Kind::Fluid {
                 let error = f64::from(got.density[i]) / expected.density[k] - 1.0;
                 assert!(error.abs() < 2e-6, "{k}: density {} {}", got.density[i], expected.density[k]);
+                if !got.rate.is_empty() {
+                    let error = (f64::from(got.carry[i][3]) - expected.rate[k]) / fastest_rate;
+                    assert!(error.abs() < 3e-5, "{k}: rate {} {}", got.carry[i][3], expected.rate[k]);
+                }
             }
-            seen += 1;
+            checked += 1;
         }
     }
-    assert_eq!(seen, particles.len());
+    assert_eq!(checked, particles.len());
 }
 
 /// Moves fluid particles by up to `by` and gives them random velocities.
@@ -233,12 +275,28 @@ fn a_box_with_walls_and_a_body() {
     }
 }
 
+#[test]
+fn density_integrated() {
+    let body = "[[rigid]]\nshape = { sphere = { center = [0, 0, 0], radius = 0.13 } }\ndensity = 500\n";
+    for dimensions in [2, 3] {
+        let text = box_scene(dimensions, "solid", body);
+        let text = text.replace("[solver]", "[solver]\ndensity = \"continuity\"");
+        let disturb = |a: &mut Assembly| {
+            jitter(a, 0.02, 2.0);
+            let n = a.state.particles.density.len();
+            let density = (0..n as u64).map(|i| 1.01 + 0.02 * (random::uniform(3, 0, i) - 0.5) as f32);
+            a.state.particles.density = density.collect();
+        };
+        compare(&text, disturb, DVec3::ZERO);
+    }
+}
+
 /// Places given one by one, in a domain of whole cells of width 1 (spacing 0.5).
 fn placed(points: &[[f64; 3]]) -> String {
     format!(
         "[world]\ngravity = [0, 0, 0]\n[domain]\nmin = [-2, -2, -2]\nmax = [2, 2, 2]\nwalls = [\"open\", \"open\", \"open\"]\n\
          [resolution]\nspacing = 0.5\n[solver]\nsound_speed = 20\n[[fluid]]\nshape = {{ points = {points:?} }}\n\
-         start = \"lattice\"\n"
+         start = \"lattice\"\nviscosity = 2.0\n"
     )
 }
 

@@ -50,6 +50,6 @@ fn line(file: &mut impl Write, time: f64, index: usize, b: &Body) -> io::Result<
 }
 
 /// A name as RFC 4180 wants it.
-fn quoted(name: &str) -> String {
+pub(super) fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
 }

@@ -1,9 +1,11 @@
 //! What a run leaves behind: one writer a kind of file, each called once a frame.
 
 mod bodies_csv;
+mod flocks_csv;
 mod particles;
 pub mod pictures;
 pub mod ply;
+mod probes_csv;
 mod stats;
 mod video;
 mod vtk;
@@ -16,6 +18,8 @@ use std::path::{Path, PathBuf};
 
 /// Something that takes note of every frame.
 trait Writer {
+    /// A step has ended.
+    fn step(&mut self, _: &World) {}
     /// A frame has ended.
     fn write(&mut self, world: &World, stats: &FrameStats) -> miette::Result<()>;
     /// The run has ended.
@@ -33,6 +37,12 @@ impl Outputs {
         let mut all: Vec<Box<dyn Writer>> = vec![Box::new(stats::Stats::create(folder)?)];
         if wants(Save::Csv) {
             all.push(Box::new(bodies_csv::BodiesCsv::create(folder)?));
+            if !scene.probe.is_empty() {
+                all.push(Box::new(probes_csv::ProbesCsv::create(folder, scene, world)?));
+            }
+            if !world.model().flocks.is_empty() {
+                all.push(Box::new(flocks_csv::FlocksCsv::create(folder)?));
+            }
         }
         if wants(Save::Png) || wants(Save::Mp4) {
             all.push(Box::new(pictures::Pictures::create(folder, wants(Save::Png), wants(Save::Mp4), scene, world)?));
@@ -44,6 +54,11 @@ impl Outputs {
             all.push(Box::new(particles::Particles::new(folder, "vtk", vtk::write_particles)));
         }
         Ok(Self(all))
+    }
+
+    /// A step has ended.
+    pub fn step(&mut self, world: &World) {
+        self.0.iter_mut().for_each(|w| w.step(world));
     }
 
     /// A frame has ended.

@@ -16,6 +16,8 @@ const HEIGHT: usize = 720;
 const RADIUS: f64 = 0.56;
 /// Speed shown white, as a fraction of the largest speed the scene can reach.
 const FAST: f64 = 0.8;
+/// Length of a dart in sizes of an agent; in radii of the flock where agents have no size.
+const DART: [f32; 2] = [4.0, 0.22];
 /// Below 1: slow water is told apart better than fast water.
 const SLOW: f32 = 0.7;
 const EDGES: [f32; 3] = [0.24, 0.26, 0.29];
@@ -117,6 +119,7 @@ impl Painter {
                 shells.extend(own.iter().map(|f| moved(f, body.q, body.x)));
             }
         }
+        shells.extend(darts(world));
         let options = Options { facets: &shells, lines: &self.edges, ground: self.ground, ..Options::default() };
         render(&balls, &self.camera, WIDTH, HEIGHT, &options)
     }
@@ -146,6 +149,26 @@ fn moved(facet: &Facet, turn: DQuat, place: DVec3) -> Facet {
         normals: facet.normals.map(|n| turn32 * n),
         color: facet.color,
     }
+}
+
+/// Agents as darts along their velocity: two crossed triangles each.
+fn darts(world: &World) -> Vec<Facet> {
+    let mut all = Vec::new();
+    let agents = &world.state().agents;
+    for flock in &world.model().flocks {
+        let color = color::of_name(&flock.name);
+        let length = if flock.size > 0.0 { DART[0] * flock.size } else { DART[1] * flock.radius };
+        for r in &agents.record[flock.range()] {
+            let (x, along) = (Vec3::from(r.x), Vec3::from(r.v).try_normalize().unwrap_or(Vec3::X));
+            let across = along.cross(Vec3::Z).try_normalize().unwrap_or(Vec3::X);
+            let (tip, tail) = (x + 0.6 * length * along, x - 0.4 * length * along);
+            for (side, normal) in [(across, along.cross(across)), (along.cross(across), across)] {
+                let corners = [tip, tail + 0.22 * length * side, tail - 0.22 * length * side];
+                all.push(Facet { corners, normals: [normal; 3], color });
+            }
+        }
+    }
+    all
 }
 
 /// A picture of a solid made of points, for `voxelize --series`.

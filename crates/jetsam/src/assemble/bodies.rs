@@ -164,7 +164,10 @@ impl Scene {
         warnings: &mut Vec<String>,
     ) -> Result<Vec<NewBody>> {
         let mut all = Vec::new();
-        let (walls, facing) = self.wall_points(grid, layers as i64);
+        // flocks alone are held by the sides themselves
+        let flocks_only = self.fluid.is_empty() && self.rigid.is_empty();
+        let (walls, facing) =
+            if flocks_only { (Vec::new(), Vec::new()) } else { self.wall_points(grid, layers as i64) };
         let mut taken = Near::new(0.5 * self.resolution.spacing);
         if !walls.is_empty() {
             for &p in &walls {

@@ -3,11 +3,18 @@
 use super::bodies::NewBody;
 use super::near::Near;
 use crate::error::Result;
+use crate::integrate::sources::Source;
 use crate::interact::cells::Grid;
-use crate::model::{ContactModel, DtBound, Factors, FluidModel, Model};
+use crate::model::{
+    ContactModel, DtBound, Factors, FluidModel, Model, cohesion_moment, cohesion_pressure, curvature_moment,
+};
 use crate::scene::joint::{JointKind, JointModel};
 use crate::scene::{Coupling, EquationOfState, Force, Scene, Start};
 use glam::DVec3;
+
+/// Reynolds number of a spacing below which walls show a mirrored velocity to viscosity: above, the layer that does not slip
+/// is thinner than particles can show.
+const NO_SLIP_BELOW: f64 = 1000.0;
 
 /// A fluid particle on its way into the state.
 pub(super) struct Drop {
@@ -17,6 +24,8 @@ pub(super) struct Drop {
     pub(super) v: DVec3,
     /// Index of its fluid.
     pub(super) fluid: u32,
+    /// Relative density `D`.
+    pub(super) density: f64,
 }
 
 impl Scene {
@@ -37,7 +46,8 @@ impl Scene {
         let (mut carved, mut outside) = (0, 0);
         for (index, f) in self.fluid.iter().enumerate() {
             let key = format!("fluid.{index}.shape");
-            let solid = self.solid(&f.shape, &key)?;
+            let Some(shape) = &f.shape else { continue };
+            let solid = self.solid(shape, &key)?;
             warnings.extend(solid.warnings.iter().cloned());
             let before = fluid.len();
             for p in solid.points {
@@ -48,11 +58,7 @@ impl Scene {
                 } else if carver.has(p, None) {
                     carved += 1;
                 } else {
-                    let mut v = DVec3::from(f.velocity);
-                    if self.world.dimensions == 2 {
-                        v.y = 0.0;
-                    }
-                    fluid.push(Drop { x: p, v, fluid: index as u32 });
+                    fluid.push(Drop { x: p, v: DVec3::ZERO, fluid: index as u32, density: 1.0 });
                 }
             }
             if fluid.len() == before {
@@ -70,9 +76,17 @@ impl Scene {
             warnings.push(format!("{outside} fluid particles outside the domain were left out"));
         }
 
-        let largest_speed = self.largest_speed(&fluid, bodies, gravity, &grid);
+        let sources = self.sources()?;
+        let starts = self.starts()?;
+        starts.set_velocities(self, &mut fluid)?;
+        let largest_speed = self.largest_speed(&fluid, bodies, &sources, gravity, &grid);
         let sound_speed = self.solver.sound_speed.unwrap_or(10.0 * largest_speed);
         self.squeeze(&mut fluid, gravity, sound_speed);
+        if starts.displace(self, &mut fluid, &grid)? {
+            starts.set_velocities(self, &mut fluid)?;
+        }
+        let cohesion = cohesion_moment(support, self.world.dimensions);
+        let curvature = curvature_moment(self.solver.kernel.force(), support, self.world.dimensions);
         let fluids: Vec<FluidModel> = self
             .fluid
             .iter()
@@ -83,6 +97,10 @@ impl Scene {
                 viscosity: f.viscosity as f32,
                 stiffness: (sound_speed * sound_speed * f.density) as f32,
                 artificial: (self.solver.artificial_viscosity * f.density * sound_speed * 0.5 * support) as f32,
+                cohesion: ((1.0 - self.solver.curvature) * f.surface_tension / cohesion) as f32,
+                curvature: (self.solver.curvature * f.surface_tension / curvature) as f32,
+                lifetime: f.lifetime.unwrap_or(f64::INFINITY),
+                diffusion: (self.solver.density_diffusion * 0.5 * support / (sound_speed * f.density)) as f32,
             })
             .collect();
         let contacts = bodies
@@ -109,10 +127,14 @@ impl Scene {
             kernel: self.solver.kernel,
             factors: Factors::new(self.solver.kernel, self.solver.support, support, self.world.dimensions),
             fluids,
+            flocks: Vec::new(),
             contacts,
             largest_speed,
             sound_speed,
             gravity,
+            sources,
+            drains: self.drains()?,
+            seed: self.world.seed,
             fields: self.force.iter().filter(|f| !matches!(f, Force::Shake(_))).cloned().collect(),
             shakes: self
                 .force
@@ -125,6 +147,8 @@ impl Scene {
             contact_diameter: self.solver.contact_diameter * spacing,
             solver: self.solver.clone(),
             dt_bounds: Vec::new(),
+            no_slip: !self.solver.walls_slip
+                && self.fluid.iter().any(|f| f.density * largest_speed * spacing < NO_SLIP_BELOW * f.viscosity),
             full_support: if self.world.dimensions == 3 {
                 4.0 / 3.0 * std::f64::consts::PI * self.solver.support.powi(3)
             } else {
@@ -148,7 +172,14 @@ impl Scene {
     }
 
     /// Largest speed the scene can reach (m/s): from depth, drop height and velocities given.
-    fn largest_speed(&self, fluid: &[Drop], bodies: &[NewBody], gravity: DVec3, grid: &Grid) -> f64 {
+    fn largest_speed(
+        &self,
+        fluid: &[Drop],
+        bodies: &[NewBody],
+        sources: &[Source],
+        gravity: DVec3,
+        grid: &Grid,
+    ) -> f64 {
         let g = gravity.length();
         let mut speed: f64 = 0.0;
         if g > 0.0 {
@@ -167,6 +198,11 @@ impl Scene {
             if top.is_finite() {
                 speed = (2.0 * g * (top - floor).max(0.0)).sqrt();
             }
+            for source in sources {
+                let top = source.points.iter().map(|&p| height(p)).fold(f64::NEG_INFINITY, f64::max);
+                let drop = (top - height(corner(false))).max(0.0);
+                speed = speed.max((2.0 * g * drop + source.velocity.length_squared()).sqrt());
+            }
             // bodies fall onto the fluid, or onto the floor where there is none
             let ground = if top.is_finite() { top } else { height(corner(false)) };
             for body in bodies.iter().filter(|b| b.mass.is_finite()) {
@@ -174,8 +210,16 @@ impl Scene {
                 speed = speed.max((2.0 * g * drop + body.v.length_squared()).sqrt());
             }
         }
+        speed = fluid.iter().map(|f| f.v.length()).fold(speed, f64::max);
         for f in &self.fluid {
-            speed = speed.max(DVec3::from(f.velocity).length());
+            // cohesion squeezes a fluid: the speed that its pressure would drive it at
+            let (support, d) = (self.solver.support * self.resolution.spacing, self.world.dimensions);
+            let cohesion = (1.0 - self.solver.curvature) * f.surface_tension / cohesion_moment(support, d);
+            let pressure = cohesion * cohesion_pressure(support, d);
+            speed = speed.max((pressure / f.density).sqrt());
+        }
+        for source in sources {
+            speed = speed.max(source.velocity.length());
         }
         for body in bodies {
             let reach = body.offset.iter().map(|o| o.length()).fold(0.0, f64::max);
@@ -219,7 +263,13 @@ impl Scene {
             };
             for p in fluid.iter_mut().filter(|p| p.fluid == index as u32) {
                 let y = p.x.dot(up) - bottom;
-                p.x += (squeezed(y) - y) * up;
+                let now = squeezed(y);
+                p.x += (now - y) * up;
+                let above = g * (squeezed(depth) - now).max(0.0) / c_sq;
+                p.density = match self.solver.equation_of_state {
+                    EquationOfState::Linear => above.exp(),
+                    EquationOfState::Tait => (1.0 + 6.0 * above).powf(1.0 / 6.0),
+                };
             }
         }
     }
@@ -233,6 +283,12 @@ impl Scene {
             if f.viscosity > 0.0 {
                 viscous = viscous.min(s.courant_viscous * model.support.powi(2) * f.density / (4.0 * f.viscosity));
             }
+        }
+        // capillary waves (Brackbill et al. 1992), in the same class as viscosity
+        for f in self.fluid.iter().filter(|f| f.surface_tension > 0.0) {
+            let wave =
+                (f.density * (0.5 * model.support).powi(3) / (2.0 * std::f64::consts::PI * f.surface_tension)).sqrt();
+            viscous = viscous.min(s.courant_force * wave);
         }
         let mut contact = f64::INFINITY;
         for joint in model.joints.iter().filter(|j| j.kind == JointKind::Spring) {

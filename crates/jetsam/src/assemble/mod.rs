@@ -5,18 +5,21 @@
 //! model's warnings.
 
 mod bodies;
+mod flocks;
 mod fluid;
 mod memory;
 mod near;
 mod relax;
+mod sources;
+mod start;
 mod surface;
 
 use crate::error::Result;
 use crate::interact::cells::Grid;
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::scene::{Force, Scene, Shape, Wall};
-use crate::state::{Bodies, Body, Kind, Particles, Record, State, Touch};
+use crate::scene::{Density, Force, Scene, Shape, Wall};
+use crate::state::{Bodies, Body, Particles, Record, State, Touch};
 use bodies::NewBody;
 use fluid::Drop;
 use glam::{DMat3, DVec3};
@@ -74,10 +77,13 @@ impl Scene {
                 carver.insert(p);
             }
         }
+        let flocks = self.flock_constants()?;
+        let agents = self.agents(&flocks, &grid, &self.obstacles(&flocks, &bodies))?;
         let (mut model, fluid) = self.derive(grid, volume, support, &bodies, joints, carver, &mut warnings)?;
+        model.add_flocks(flocks);
         model.warnings = warnings;
         let meshes = bodies.iter().map(|b| b.mesh.clone()).collect();
-        let state = join(fluid, bodies, rigid_count, &model);
+        let state = State { agents, ..join(fluid, bodies, rigid_count, &model) };
         let particles = state.particles.len() as f64;
         check_available(particles * BYTES_PER_PARTICLE).map_err(|(need, have)| {
             let message = format!("{particles} particles need {need:.1} GB of memory, and {have:.1} GB are available");
@@ -106,11 +112,11 @@ impl Scene {
                 self.check_period(shake.period, &format!("force.{index}.shake"))?;
             }
         }
-        if self.fluid.is_empty() && self.rigid.is_empty() {
+        if self.fluid.is_empty() && self.rigid.is_empty() && self.flock.is_empty() {
             return Err(self.error(
                 "",
-                "the scene has neither fluid nor rigid bodies",
-                "add a [[fluid]] or a [[rigid]]",
+                "the scene has neither fluid nor rigid bodies nor flocks",
+                "add a [[fluid]], a [[rigid]] or a [[flock]]",
             ));
         }
         let support = self.solver.support * self.resolution.spacing;
@@ -142,7 +148,8 @@ impl Scene {
             _ => 0.0,
         };
         let cell = self.resolution.spacing.powi(self.world.dimensions as i32);
-        let particles: f64 = self.fluid.iter().map(|f| reach(&f.shape).max(0.0)).sum::<f64>() / cell;
+        let volume: f64 = self.fluid.iter().filter_map(|f| f.shape.as_ref()).map(|s| reach(s).max(0.0)).sum();
+        let particles = volume / cell;
         let need = cells * BYTES_PER_CELL + particles * BYTES_PER_PARTICLE;
         let too_many = cells >= f64::from(i32::MAX) || particles >= f64::from(i32::MAX);
         if too_many || check_available(need).is_err() {
@@ -218,25 +225,35 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
         }
     }
     let n = fluid.len();
-    let total = n + bodies.record.len();
+    // the fluid's segment has places for fluid to come
+    let room = n + if model.sources.is_empty() { 0 } else { n / 2 + 1024 };
+    let total = room + bodies.record.len();
+    let integrated = model.solver.density == Density::Continuity;
+    let carried = integrated || model.solver.xsph > 0.0 || model.solver.shifting > 0.0;
+    let mortal = model.fluids.iter().any(|f| f.lifetime.is_finite());
     let mut p = Particles {
-        record: Vec::with_capacity(total),
+        record: vec![Record::default(); total],
         push: vec![[0.0; 3]; total],
-        push_before: vec![[0.0; 3]; n],
-        density: vec![1.0; n],
-        touch: vec![Touch::default(); total - n],
-        carry: if model.solver.xsph > 0.0 { vec![[0.0; 3]; n] } else { Vec::new() },
-        id: (0..n as u32).chain(0..bodies.record.len() as u32).collect(),
-        owner: fluid.iter().map(|f| f.fluid).chain(bodies.owner.iter().copied()).collect(),
-        first: [0, n, n + bodies.rigid_slots],
+        push_before: vec![[0.0; 3]; room],
+        density: vec![1.0; room],
+        touch: vec![Touch::default(); total - room],
+        rate: vec![[0.0; 2]; if integrated { room } else { 0 }],
+        carry: vec![[0.0; 4]; if carried { room } else { 0 }],
+        gradient: vec![[0.0; 4]; if model.wants_gradients() { room } else { 0 }],
+        vorticity: vec![[0.0; 3]; if model.wants_gradients() { room } else { 0 }],
+        born: vec![0.0; if mortal { room } else { 0 }],
+        id: (0..room as u32).chain(0..bodies.record.len() as u32).collect(),
+        owner: vec![0; room].into_iter().chain(bodies.owner.iter().copied()).collect(),
+        first: [0, room, room + bodies.rigid_slots],
         count: [n, bodies.rigid_slots, bodies.record.len() - bodies.rigid_slots],
     };
-    for Drop { x, v, .. } in fluid {
-        let (mut x, v) = (x.as_vec3().to_array(), v.as_vec3().to_array());
+    for (i, drop) in fluid.into_iter().enumerate() {
+        let (mut x, v) = (drop.x.as_vec3().to_array(), drop.v.as_vec3().to_array());
         model.grid.wrap(&mut x);
-        p.record.push(Record { x, volume: model.volume as f32, v, share: 0.0 });
+        p.record[i] = Record { x, volume: model.volume as f32, v, share: 0.0 };
+        p.density[i] = drop.density as f32;
+        p.owner[i] = drop.fluid;
     }
-    p.record.extend_from_slice(&bodies.record);
-    debug_assert_eq!(p.len(), p.segment(Kind::Static).end);
-    State { particles: p, bodies }
+    p.record[room..].copy_from_slice(&bodies.record);
+    State { particles: p, bodies, ..State::default() }
 }

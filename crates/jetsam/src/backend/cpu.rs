@@ -4,16 +4,18 @@
 //! are made in their order: the same bits for any number of threads.
 
 use super::Backend;
+use crate::flock::{Crowd, Surroundings};
 use crate::integrate::sleep::{self, Rest};
-use crate::integrate::{Advance, bodies, joints, particles};
+use crate::integrate::{Advance, bodies, joints, particles, sources};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::contacts::Surfaces;
-use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
-use crate::interact::{CHUNK, boundary, density, forces, pressure};
+use crate::interact::neighbours::{Around, NeighbourChunk, Places, with_scratch};
+use crate::interact::{CHUNK, boundary, density, forces, gradients, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
+use crate::scene::Density;
 use crate::stage::Stage;
-use crate::state::{Kind, Record, State, Touch};
+use crate::state::{Body, Kind, Record, State, Touch};
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -27,9 +29,12 @@ pub struct Cpu {
     neighbours: [Vec<NeighbourChunk>; Kind::COUNT],
     /// The other half of the double buffers of `cells`.
     spare: Spare,
+    places: Places,
     /// Where the particle of each rigid or static slot stands.
     place: Vec<AtomicU32>,
     share: Vec<f32>,
+    /// Velocities that bodies' particles show to viscosity (m/s), all particles; empty where they show their own.
+    mirror: Vec<[f32; 4]>,
     parts: Vec<bodies::Part>,
     particle_mass: Vec<f32>,
     /// Angular velocity of each body (rad/s), for contacts.
@@ -43,6 +48,12 @@ pub struct Cpu {
     sums: Vec<Ledger>,
     ledger: Ledger,
     static_copies: u32,
+    next_id: u32,
+    /// Force that holds fluid inside hoses to their speed (N).
+    held: DVec3,
+    crowd: Crowd,
+    /// Radius of each body about its centre of mass (m).
+    body_radius: Vec<f32>,
 }
 
 /// Arrays that `cells` writes while it reads their twins.
@@ -51,6 +62,9 @@ struct Spare {
     record: Vec<Record>,
     id: Vec<u32>,
     owner: Vec<u32>,
+    density: Vec<f32>,
+    rate: Vec<[f32; 2]>,
+    born: Vec<f32>,
 }
 
 impl Default for Cpu {
@@ -61,8 +75,10 @@ impl Default for Cpu {
             cells: Default::default(),
             neighbours: Default::default(),
             spare: Spare::default(),
+            places: Places::default(),
             place: Vec::new(),
             share: Vec::new(),
+            mirror: Vec::new(),
             parts: Vec::new(),
             particle_mass: Vec::new(),
             spin: Vec::new(),
@@ -73,6 +89,10 @@ impl Default for Cpu {
             sums: Vec::new(),
             ledger: Ledger::default(),
             static_copies: 0,
+            next_id: 0,
+            held: DVec3::ZERO,
+            crowd: Crowd::default(),
+            body_radius: Vec::new(),
         }
     }
 }
@@ -84,25 +104,42 @@ impl Backend for Cpu {
 
     fn upload(&mut self, state: State) {
         let p = &state.particles;
-        self.spare = Spare { record: p.record.clone(), id: p.id.clone(), owner: p.owner.clone() };
+        self.spare = Spare {
+            record: p.record.clone(),
+            id: p.id.clone(),
+            owner: p.owner.clone(),
+            density: p.density.clone(),
+            rate: p.rate.clone(),
+            born: p.born.clone(),
+        };
         self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
+        self.places = Places::new(p.record.len());
         self.share = vec![0.0; state.particles.record.len()];
         self.parts = bodies::parts(&state.bodies.body);
         self.stirred = state.bodies.body.iter().map(|_| AtomicBool::new(false)).collect();
         self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
         self.ledger = Ledger::default();
         self.static_copies = 0;
+        self.next_id = p.count[Kind::Fluid as usize] as u32;
+        let far = |b: &Body| state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max) as f32;
+        self.body_radius = state.bodies.body.iter().map(far).collect();
         self.state = state;
     }
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
         match stage {
             Stage::Drift => self.drift(model, advance),
-            Stage::Cells => self.sort(&model.grid),
+            Stage::Sources => self.sources(model, advance),
+            Stage::Cells => self.sort(model),
             Stage::Density => self.density(model),
             Stage::Pressure => self.pressure(model),
             Stage::Boundary => self.boundary(model, advance),
-            Stage::Forces => self.forces(model, advance),
+            Stage::Gradients => self.gradients(model),
+            Stage::Forces => {
+                self.forces(model, advance);
+                self.held = sources::hold(&mut self.state.particles, model);
+            }
+            Stage::Agents => self.agents(model, advance),
             Stage::Bodies => self.bodies(model, advance),
             Stage::Kick => self.kick(model, advance),
             Stage::Ledger => self.tally(model, advance),
@@ -130,7 +167,7 @@ macro_rules! chunks_mut {
 
 impl Cpu {
     fn drift(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let fluid = p.segment(Kind::Fluid);
         let carry = &p.carry;
         chunks_mut!(p.record, fluid.clone()).zip(p.push[fluid].par_chunks(CHUNK)).enumerate().for_each(
@@ -139,10 +176,17 @@ impl Cpu {
                 particles::drift(model.solver.integrator, advance, &model.grid, records, push, carry);
             },
         );
+        if !p.rate.is_empty() {
+            let n = p.count[Kind::Fluid as usize];
+            chunks_mut!(p.density, ..n)
+                .zip(chunks_mut!(p.rate, ..n))
+                .zip(p.carry[..n].par_chunks(CHUNK))
+                .for_each(|((density, rate), carry)| particles::predict(advance, density, rate, carry));
+        }
         if advance.drag == 0.0 {
             let paths = model.paths.par_iter().with_min_len(CHUNK);
             b.body.par_iter_mut().zip(paths).for_each(|(body, path)| match path {
-                Some(path) => bodies::script(body, path, advance.time),
+                Some(path) => bodies::script(body, path, advance.end()),
                 None => bodies::half_kick(body, model, advance.dt),
             });
             joints::drift(b, model, advance.dt);
@@ -151,8 +195,34 @@ impl Cpu {
         }
     }
 
+    /// Fluid is born and drained (E31). Where the fluid's segment has to grow, bodies' particles move up.
+    fn sources(&mut self, model: &Model, advance: Advance) {
+        self.ledger.crossed = DVec3::ZERO;
+        if advance.drag > 0.0 {
+            return;
+        }
+        let p = &mut self.state.particles;
+        let (before, id) = (p.first, self.next_id);
+        self.ledger.crossed += sources::bear(p, model, advance.time, advance.dt, &mut self.next_id);
+        self.ledger.born += u64::from(self.next_id - id);
+        if p.first != before {
+            let total = p.record.len();
+            self.spare.record.resize(total, Record::default());
+            self.spare.id.resize(total, 0);
+            self.spare.owner.resize(total, 0);
+            self.spare.density.resize(p.density.len(), 1.0);
+            self.spare.rate.resize(p.rate.len(), [0.0; 2]);
+            self.spare.born.resize(p.born.len(), 0.0);
+            self.places = Places::new(total);
+            self.share.resize(total, 0.0);
+            self.static_copies = 0;
+        }
+        sources::drain(p, model, advance.time + advance.dt);
+    }
+
     /// Sorts every kind. Fluids change places for good; particles of bodies are copied from their slots.
-    fn sort(&mut self, grid: &Grid) {
+    fn sort(&mut self, model: &Model) {
+        let grid = &model.grid;
         let p = &mut self.state.particles;
         let from = &mut self.spare;
         let fluid = p.segment(Kind::Fluid);
@@ -161,37 +231,67 @@ impl Cpu {
         self.ledger.left += cells.left as u64;
         self.ledger.lost += cells.lost as u64;
         self.ledger.nonfinite += cells.nonfinite as u64;
+        self.ledger.drained += cells.drained as u64;
         std::mem::swap(&mut p.record, &mut from.record);
         std::mem::swap(&mut p.id, &mut from.id);
         std::mem::swap(&mut p.owner, &mut from.owner);
         let n = fluid.len();
+        let [x, y, z] = &mut self.places.x;
         chunks_mut!(p.record, ..n)
             .zip(chunks_mut!(p.push_before, ..n))
             .zip(chunks_mut!(p.id, ..n))
             .zip(chunks_mut!(p.owner, ..n))
+            .zip(chunks_mut!(x, ..n).zip(chunks_mut!(y, ..n)).zip(chunks_mut!(z, ..n)))
             .zip(cells.order[..n].par_chunks(CHUNK))
-            .for_each(|((((record, push), id), owner), order)| {
+            .for_each(|(((((record, push), id), owner), ((x, y), z)), order)| {
                 for (k, place) in order.iter().enumerate() {
                     let place = place.load(Relaxed) as usize;
                     record[k] = from.record[place];
+                    [x[k], y[k], z[k]] = record[k].x;
                     push[k] = p.push[place];
                     id[k] = from.id[place];
                     owner[k] = from.owner[place];
                 }
             });
+        for k in living..n {
+            let momentum = model.fluids[p.owner[k] as usize].mass * glam::Vec3::from(p.record[k].v);
+            if momentum.is_finite() {
+                self.ledger.crossed -= momentum.as_dvec3();
+            }
+        }
+        if !p.born.is_empty() {
+            std::mem::swap(&mut p.born, &mut from.born);
+            chunks_mut!(p.born, ..n).zip(cells.order[..n].par_chunks(CHUNK)).for_each(|(born, order)| {
+                born.iter_mut().zip(order).for_each(|(b, place)| *b = from.born[place.load(Relaxed) as usize]);
+            });
+        }
+        if !p.rate.is_empty() {
+            std::mem::swap(&mut p.density, &mut from.density);
+            std::mem::swap(&mut p.rate, &mut from.rate);
+            chunks_mut!(p.density, ..n).zip(chunks_mut!(p.rate, ..n)).zip(cells.order[..n].par_chunks(CHUNK)).for_each(
+                |((density, rate), order)| {
+                    for (k, place) in order.iter().enumerate() {
+                        let place = place.load(Relaxed) as usize;
+                        density[k] = from.density[place];
+                        rate[k] = from.rate[place];
+                    }
+                },
+            );
+        }
         p.count[Kind::Fluid as usize] = living;
 
         self.copy_bodies(grid, Kind::Rigid);
         // static particles stay where they are: once into each half of the double buffer
         if self.static_copies < 2 {
             self.copy_bodies(grid, Kind::Static);
+            self.cells[Kind::Static as usize].map(grid);
             self.static_copies += 1;
         }
     }
 
     /// Sorts the slots of a kind of body and copies them to their places.
     fn copy_bodies(&mut self, grid: &Grid, kind: Kind) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let slots = match kind {
             Kind::Rigid => 0..b.rigid_slots,
             _ => b.rigid_slots..b.record.len(),
@@ -202,15 +302,18 @@ impl Cpu {
         let range = range.start..range.start + slots.len();
         p.count[kind as usize] = inside;
         let (order, place, base) = (&cells.order, &self.place, range.start);
+        let [x, y, z] = &mut self.places.x;
         chunks_mut!(p.record, range.clone())
             .zip(chunks_mut!(p.id, range.clone()))
-            .zip(chunks_mut!(p.owner, range))
+            .zip(chunks_mut!(p.owner, range.clone()))
+            .zip(chunks_mut!(x, range.clone()).zip(chunks_mut!(y, range.clone())).zip(chunks_mut!(z, range)))
             .zip(order[..slots.len()].par_chunks(CHUNK))
             .enumerate()
-            .for_each(|(c, (((record, id), owner), order))| {
+            .for_each(|(c, ((((record, id), owner), ((x, y), z)), order))| {
                 for (k, from) in order.iter().enumerate() {
                     let slot = slots.start + from.load(Relaxed) as usize;
                     record[k] = b.record[slot];
+                    [x[k], y[k], z[k]] = record[k].x;
                     id[k] = slot as u32;
                     owner[k] = b.owner[slot];
                     let at = c * CHUNK + k;
@@ -226,6 +329,7 @@ impl Cpu {
         let around = Around {
             grid: &model.grid,
             records: &p.record,
+            places: &self.places,
             owner: &p.owner,
             cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
             first: p.first,
@@ -239,7 +343,7 @@ impl Cpu {
             let chunks = &mut self.neighbours[kind as usize];
             chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
             let members = |c: usize| first + c * CHUNK..first + ((c + 1) * CHUNK).min(n);
-            if kind == Kind::Fluid {
+            if kind == Kind::Fluid && model.solver.density == Density::Summation {
                 chunks.par_iter_mut().zip(chunks_mut!(p.density, ..n)).enumerate().for_each(|(c, (chunk, density))| {
                     with_scratch(|scratch| {
                         dispatch!(level, simd => {
@@ -269,26 +373,57 @@ impl Cpu {
     }
 
     fn boundary(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b } = &mut self.state;
-        let (level, gravity) = (self.level, model.gravity_at(advance.time).as_vec3());
+        let State { particles: p, bodies: b, .. } = &mut self.state;
+        let (level, gravity) = (self.level, model.gravity_at(advance.end()).as_vec3());
+        if model.no_slip {
+            self.mirror.resize(p.record.len(), [0.0; 4]);
+        }
         for kind in [Kind::Rigid, Kind::Static] {
             let segment = p.segment(kind);
             let (records, owner, first) = (&p.record, &p.owner, segment.start);
-            chunks_mut!(self.share, segment.clone()).zip(&self.neighbours[kind as usize]).enumerate().for_each(
-                |(c, (share, chunk))| {
-                    dispatch!(level, simd => {
-                        boundary::chunk(simd, model, records, owner, &b.body, gravity, first + c * CHUNK, chunk, share);
-                    });
-                },
-            );
+            let neighbours = &self.neighbours[kind as usize];
+            let work = |c: usize, share: &mut [f32], chunk: &NeighbourChunk, mirror: &mut [[f32; 4]]| {
+                if !chunk.found {
+                    share.fill(0.0);
+                    return mirror.fill([0.0; 4]);
+                }
+                dispatch!(level, simd => {
+                    boundary::chunk(simd, model, records, owner, &b.body, gravity, first + c * CHUNK, chunk, share, mirror);
+                });
+            };
+            let chunks = chunks_mut!(self.share, segment.clone()).zip(neighbours).enumerate();
+            if model.no_slip {
+                let mirror = chunks_mut!(self.mirror, segment.clone());
+                chunks.zip(mirror).for_each(|((c, (share, chunk)), mirror)| work(c, share, chunk, mirror));
+            } else {
+                chunks.for_each(|(c, (share, chunk))| work(c, share, chunk, &mut []));
+            }
             for (record, share) in p.record[segment.clone()].iter_mut().zip(&self.share[segment]) {
                 record.share = *share;
             }
         }
     }
 
+    fn gradients(&mut self, model: &Model) {
+        let p = &mut self.state.particles;
+        if p.gradient.is_empty() {
+            return;
+        }
+        let (records, owner, level) = (&p.record, &p.owner, self.level);
+        let n = p.count[Kind::Fluid as usize];
+        chunks_mut!(p.gradient, ..n)
+            .zip(chunks_mut!(p.vorticity, ..n))
+            .zip(&self.neighbours[Kind::Fluid as usize])
+            .enumerate()
+            .for_each(|(c, ((gradient, vorticity), chunk))| {
+                dispatch!(level, simd => {
+                    gradients::chunk(simd, model, records, owner, c * CHUNK, chunk, gradient, vorticity);
+                });
+            });
+    }
+
     fn forces(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
         self.spin.clear();
         self.spin.extend(b.body.iter().map(|b| b.omega.as_vec3().to_array()));
@@ -299,8 +434,10 @@ impl Cpu {
         self.stirred.iter_mut().for_each(|s| *s.get_mut() = false);
         let (spin, sharers, rest, stirred) = (&self.spin, &self.sharers, &self.rest, &self.stirred);
         let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slip: &b.slip, sharers, rest, stirred, spin };
-        let (gravity, dt) = (model.gravity_at(advance.time).as_vec3(), advance.dt as f32);
+        let gravity = model.gravity_at(advance.end()).as_vec3();
         let bodies_first = p.first[Kind::Rigid as usize];
+        let (mirror, gradient) = (&self.mirror[..], &p.gradient[..]);
+        let (dt, fastest) = (advance.dt as f32, self.ledger.speed as f32);
         for kind in Kind::ALL {
             let first = p.first[kind as usize];
             let segment = first..first + p.count[kind as usize];
@@ -308,33 +445,72 @@ impl Cpu {
             let work = |c: usize,
                         push: &mut [[f32; 3]],
                         chunk: &NeighbourChunk,
-                        carry: &mut [[f32; 3]],
+                        carry: &mut _,
+                        vorticity: &mut _,
                         touch: &mut [Touch]| {
+                if !chunk.found && kind == Kind::Static {
+                    touch.fill(Touch::default());
+                    return push.fill([0.0; 3]);
+                }
                 let first = first + c * CHUNK;
-                let input = forces::Input { model, records, owner, first, particle_mass, surfaces, gravity, dt };
-                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry, touch));
+                let input = forces::Input {
+                    model,
+                    records,
+                    mirror,
+                    gradient,
+                    owner,
+                    first,
+                    particle_mass,
+                    surfaces,
+                    gravity,
+                    dt,
+                    fastest,
+                };
+                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry, vorticity, touch));
             };
             if kind != Kind::Fluid {
                 let touch = p.touch[first - bodies_first..].par_chunks_mut(CHUNK);
-                chunks.zip(touch).for_each(|((c, (push, chunk)), touch)| work(c, push, chunk, &mut [], touch));
-            } else if !p.carry.is_empty() {
-                let carry = p.carry.par_chunks_mut(CHUNK);
-                chunks.zip(carry).for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry, &mut []));
-            } else {
-                chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut [], &mut []));
+                chunks.zip(touch).for_each(|((c, (push, chunk)), touch)| work(c, push, chunk, &mut [], &mut [], touch));
+                continue;
+            }
+            match (!p.carry.is_empty(), !gradient.is_empty()) {
+                (true, true) => {
+                    let (carry, vorticity) = (p.carry.par_chunks_mut(CHUNK), p.vorticity.par_chunks_mut(CHUNK));
+                    let all = chunks.zip(carry).zip(vorticity);
+                    all.for_each(|(((c, (push, chunk)), carry), vorticity)| {
+                        work(c, push, chunk, carry, vorticity, &mut [])
+                    });
+                }
+                (true, false) => {
+                    let all = chunks.zip(p.carry.par_chunks_mut(CHUNK));
+                    all.for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry, &mut [], &mut []));
+                }
+                (false, true) => {
+                    let all = chunks.zip(p.vorticity.par_chunks_mut(CHUNK));
+                    all.for_each(|((c, (push, chunk)), vorticity)| work(c, push, chunk, &mut [], vorticity, &mut []));
+                }
+                (false, false) => chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut [], &mut [], &mut [])),
             }
         }
     }
 
+    fn agents(&mut self, model: &Model, advance: Advance) {
+        let State { particles, bodies, agents } = &mut self.state;
+        let cells = [&self.cells[0], &self.cells[1], &self.cells[2]];
+        let world = Surroundings { model, particles, cells, bodies: &bodies.body, radius: &self.body_radius };
+        self.crowd.run(self.level, &world, agents, advance);
+        self.ledger.nonfinite += self.crowd.nonfinite as u64;
+    }
+
     fn bodies(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let (place, push, touch, first) = (&self.place, &p.push, &p.touch, p.first[Kind::Rigid as usize]);
         let felt = |slot: usize| match place[slot].load(Relaxed) {
             GONE => None,
             at => Some((&push[at as usize], &touch[at as usize - first])),
         };
         let before: Vec<bool> = b.body.iter().map(|b| b.deep).collect();
-        bodies::sum(b, &mut self.parts, felt, model.gravity_at(advance.time), model.dimensions);
+        bodies::sum(b, &mut self.parts, felt, model.gravity_at(advance.end()), model.dimensions);
         joints::springs(b, model);
         for (body, before) in b.body.iter_mut().zip(before) {
             let far = body.contacts > 0 && body.v.length() * advance.dt > 0.5 * model.contact_diameter;
@@ -349,7 +525,7 @@ impl Cpu {
     }
 
     fn kick(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b } = &mut self.state;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let integrator = model.solver.integrator;
         let fluid = p.segment(Kind::Fluid);
         chunks_mut!(p.record, fluid.clone())
@@ -358,6 +534,13 @@ impl Cpu {
             .for_each(|((records, push), before)| {
                 particles::kick(integrator, advance, records, push, before);
             });
+        if !p.rate.is_empty() {
+            let n = p.count[Kind::Fluid as usize];
+            chunks_mut!(p.density, ..n)
+                .zip(p.rate[..n].par_chunks(CHUNK))
+                .zip(p.carry[..n].par_chunks(CHUNK))
+                .for_each(|((density, rate), carry)| particles::correct(advance, density, rate, carry));
+        }
         if advance.drag == 0.0 {
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::kick(body, integrator, advance.dt));
             joints::kick(b, model);
@@ -370,8 +553,8 @@ impl Cpu {
     }
 
     fn tally(&mut self, model: &Model, advance: Advance) {
-        let gravity = model.gravity_at(advance.time);
-        let State { particles: p, bodies: b } = &self.state;
+        let gravity = model.gravity_at(advance.end());
+        let State { particles: p, bodies: b, .. } = &self.state;
         let fluid = p.segment(Kind::Fluid);
         let n = fluid.len();
         self.sums.resize_with(n.div_ceil(CHUNK), Ledger::default);
@@ -383,7 +566,8 @@ impl Cpu {
                 records: &p.record[range.clone()],
                 push: &p.push[range.clone()],
                 density: &p.density[range.clone()],
-                owner: &p.owner[range],
+                owner: &p.owner[range.clone()],
+                confined: p.vorticity.get(range).filter(|_| model.solver.vorticity > 0.0),
                 neighbours: &neighbours[c],
                 gravity,
             };
@@ -391,10 +575,13 @@ impl Cpu {
         });
         let mut total = Ledger {
             left: self.ledger.left,
+            born: self.ledger.born,
+            drained: self.ledger.drained,
+            crossed: self.ledger.crossed,
             lost: self.ledger.lost,
             nonfinite: self.ledger.nonfinite,
             fast_contacts: self.ledger.fast_contacts,
-            external_force: b.joint_force,
+            external_force: self.held + b.joint_force,
             external_impulse: b.joint_impulse,
             fluid: n,
             rigid_lost: self.cells[Kind::Rigid as usize].lost.saturating_sub(self.scripted_outside(model)),
@@ -465,6 +652,7 @@ struct Part<'a> {
     push: &'a [[f32; 3]],
     density: &'a [f32],
     owner: &'a [u32],
+    confined: Option<&'a [[f32; 3]]>,
     neighbours: &'a NeighbourChunk,
     gravity: DVec3,
 }
@@ -487,6 +675,9 @@ impl Part<'_> {
             let mut outside = self.gravity;
             if !model.fields.is_empty() {
                 outside += forces::fields(model, r).as_dvec3();
+            }
+            if let Some(confined) = self.confined {
+                outside += DVec3::from(confined[k].map(f64::from));
             }
             sum.external_force += mass * outside;
             sum.kinetic += 0.5 * mass * speed * speed;

@@ -7,14 +7,31 @@ pub mod bodies;
 pub mod joints;
 pub mod particles;
 pub mod sleep;
+pub mod sources;
 
 /// How a step advances time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Advance {
+    /// Time at the beginning of the step (s).
+    pub time: f64,
     /// Length of the step (s).
     pub dt: f64,
-    /// Simulated time at its end (s).
-    pub time: f64,
+    /// Length of the step before (s); 0 at the beginning.
+    pub dt_before: f64,
     /// Drag on fluids (1/s): not zero only while a scene settles, and then bodies stand still.
     pub drag: f64,
+}
+
+impl Advance {
+    /// How far rates are extrapolated from the last two steps: half a step in units of the step before.
+    fn ahead(&self) -> f32 {
+        if self.dt_before > 0.0 { (0.5 * self.dt / self.dt_before) as f32 } else { 0.0 }
+    }
+}
+
+impl Advance {
+    /// Time at the end of the step (s).
+    pub fn end(&self) -> f64 {
+        self.time + self.dt
+    }
 }

@@ -38,6 +38,9 @@ pub struct Grid {
 const LEFT: u32 = 1;
 const LOST: u32 = 2;
 const NONFINITE: u32 = 3;
+const OUT: u32 = 4;
+/// The first coordinate of a fluid particle that a sink has taken.
+pub const DRAINED: f32 = f32::MAX;
 
 impl Grid {
     /// Cells for a domain. `wall` is how deep solid walls reach outside the domain (m).
@@ -50,8 +53,8 @@ impl Grid {
             inverse: [0.0; 3],
             cells: [1; 3],
             period: [0.0; 3],
-            lower: [f32::NEG_INFINITY; 3],
-            upper: [f32::INFINITY; 3],
+            lower: [f32::MIN; 3],
+            upper: [f32::MAX; 3],
         };
         for a in 0..3 {
             if dimensions == 2 && a == 1 {
@@ -86,6 +89,12 @@ impl Grid {
         })
     }
 
+    /// Index of a cell of the grid.
+    #[inline(always)]
+    fn index(&self, c: [i32; 3]) -> usize {
+        (c[2] as usize * self.cells[1] as usize + c[1] as usize) * self.cells[0] as usize + c[0] as usize
+    }
+
     /// Brings a position on periodic axes back into the domain.
     #[inline]
     pub fn wrap(&self, x: &mut [f32; 3]) {
@@ -107,10 +116,19 @@ impl Grid {
     }
 
     /// Why a particle at `x` is no longer part of the simulation; 0 if it is.
-    #[inline]
+    #[inline(always)]
     fn gone(&self, x: [f32; 3]) -> u32 {
+        let inside = (0..3).fold(true, |inside, a| inside & (x[a] >= self.lower[a]) & (x[a] <= self.upper[a]));
+        if inside { 0 } else { self.why_gone(x) }
+    }
+
+    #[cold]
+    fn why_gone(&self, x: [f32; 3]) -> u32 {
         if !x.iter().all(|c| c.is_finite()) {
             return NONFINITE;
+        }
+        if x[0] == DRAINED {
+            return OUT;
         }
         let mut gone = 0;
         for a in 0..3 {
@@ -134,17 +152,19 @@ pub struct Window {
 impl Window {
     const EMPTY: Self = Self { min: [i32::MAX; 3], cells: [0; 3] };
 
-    fn around(c: [i32; 3]) -> Self {
-        Self { min: c, cells: [1; 3] }
-    }
-
-    fn union(self, other: Self) -> Self {
-        if self.cells[0] == 0 || other.cells[0] == 0 {
-            return if self.cells[0] == 0 { other } else { self };
+    /// The box of cells that holds all records inside the domain.
+    fn of(grid: &Grid, records: &[Record]) -> Self {
+        let chunks = records.par_chunks(CHUNK).map(|chunk| {
+            let mut ends = Ends::NONE;
+            chunk.iter().filter(|r| grid.gone(r.x) == 0).for_each(|r| ends = ends.with(r.x, r.x));
+            ends
+        });
+        let Ends([low, high]) = chunks.reduce(|| Ends::NONE, |a, b| a.with(b.0[0], b.0[1]));
+        if (0..3).any(|a| low[a] > high[a]) {
+            return Self::EMPTY;
         }
-        let end = |w: &Self, a: usize| w.min[a] + w.cells[a];
-        let min = std::array::from_fn(|a| self.min[a].min(other.min[a]));
-        Self { min, cells: std::array::from_fn(|a| end(&self, a).max(end(&other, a)) - min[a]) }
+        let (min, max) = (grid.coordinates(low), grid.coordinates(high));
+        Self { min, cells: std::array::from_fn(|a| max[a] - min[a] + 1) }
     }
 
     fn len(&self) -> usize {
@@ -156,6 +176,22 @@ impl Window {
     fn index(&self, c: [i32; 3]) -> usize {
         let [x, y, z] = [c[0] - self.min[0], c[1] - self.min[1], c[2] - self.min[2]];
         ((z * self.cells[1] + y) * self.cells[0] + x) as usize
+    }
+}
+
+/// Lower and upper ends of a set of places (m).
+#[derive(Clone, Copy)]
+struct Ends([[f32; 3]; 2]);
+
+impl Ends {
+    const NONE: Self = Self([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]);
+
+    #[inline(always)]
+    fn with(self, low: [f32; 3], high: [f32; 3]) -> Self {
+        Self([
+            std::array::from_fn(|a| if low[a] < self.0[0][a] { low[a] } else { self.0[0][a] }),
+            std::array::from_fn(|a| if high[a] > self.0[1][a] { high[a] } else { self.0[1][a] }),
+        ])
     }
 }
 
@@ -174,6 +210,10 @@ pub struct Cells {
     pub lost: usize,
     /// Particles whose position was not finite, at this sort.
     pub nonfinite: usize,
+    /// A bit for each cell of the grid: whether there are particles in the cells around. Empty if not mapped.
+    map: Vec<u64>,
+    /// Particles that a sink has taken, at this sort.
+    pub drained: usize,
     keys: Vec<u32>,
     counts: Vec<Vec<u32>>,
 }
@@ -183,15 +223,9 @@ impl Cells {
     /// particles are still inside.
     pub fn sort(&mut self, grid: &Grid, records: &[Record], id: Option<&[u32]>) -> usize {
         let n = records.len();
-        self.window = records
-            .par_chunks(CHUNK)
-            .map(|chunk| {
-                let living = chunk.iter().filter(|r| grid.gone(r.x) == 0);
-                living.fold(Window::EMPTY, |w, r| w.union(Window::around(grid.coordinates(r.x))))
-            })
-            .reduce(|| Window::EMPTY, Window::union);
+        self.window = Window::of(grid, records);
         let (window, cells) = (self.window, self.window.len());
-        let bins = cells + NONFINITE as usize;
+        let bins = cells + OUT as usize;
         self.start.resize(bins + 1, 0);
         self.keys.resize(n, 0);
         if self.order.len() < n {
@@ -242,11 +276,58 @@ impl Cells {
         self.left = (self.start[cells + 1] - self.start[cells]) as usize;
         self.lost = (self.start[cells + 2] - self.start[cells + 1]) as usize;
         self.nonfinite = (self.start[cells + 3] - self.start[cells + 2]) as usize;
-        n - self.left - self.lost - self.nonfinite
+        self.drained = (self.start[cells + 4] - self.start[cells + 3]) as usize;
+        n - self.left - self.lost - self.nonfinite - self.drained
     }
 }
 
 impl Cells {
+    /// Where cell `c`, of a particle that was sorted, ends in the sorted order.
+    #[inline(always)]
+    pub fn end(&self, c: [i32; 3]) -> usize {
+        self.start[self.window.index(c) + 1] as usize
+    }
+
+    /// Whether there may be particles in the 27 cells around `c`: exact where the cells have been mapped.
+    #[inline(always)]
+    pub fn are_near(&self, grid: &Grid, c: [i32; 3]) -> bool {
+        if !self.map.is_empty() {
+            let at = grid.index(c);
+            return self.map[at / 64] >> (at % 64) & 1 == 1;
+        }
+        let w = &self.window;
+        w.cells[0] > 0
+            && (0..3).all(|a| {
+                let within = c[a] + 1 >= w.min[a] && c[a] <= w.min[a] + w.cells[a];
+                within || grid.period[a] > 0.0 && (c[a] == 0 || c[a] == grid.cells[a] - 1)
+            })
+    }
+
+    /// Maps where particles are near, for a kind that stays where it is.
+    pub fn map(&mut self, grid: &Grid) {
+        self.map.clear();
+        self.map.resize(grid.cells.iter().map(|&n| n as usize).product::<usize>().div_ceil(64), 0);
+        let w = self.window;
+        for (cell, bounds) in self.start[..=w.len()].windows(2).enumerate() {
+            if bounds[0] == bounds[1] {
+                continue;
+            }
+            let (x, yz) = (cell as i32 % w.cells[0], cell as i32 / w.cells[0]);
+            let c = [x, yz % w.cells[1], yz / w.cells[1]];
+            for k in 0..27 {
+                let around = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
+                let c = std::array::from_fn(|a| {
+                    let c = w.min[a] + c[a] + around[a];
+                    if grid.period[a] > 0.0 { c.rem_euclid(grid.cells[a]) } else { c }
+                });
+                if (0..3).all(|a| (0..grid.cells[a]).contains(&c[a])) {
+                    let at = grid.index(c);
+                    self.map[at / 64] |= 1 << (at % 64);
+                }
+            }
+        }
+    }
+
     /// Places, in the sorted order, of the particles in cells `from..=to` of the row at `y`, `z`.
     #[inline(always)]
     pub fn row(&self, from: i32, to: i32, y: i32, z: i32) -> std::ops::Range<usize> {

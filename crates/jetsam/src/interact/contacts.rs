@@ -3,7 +3,8 @@
 //! In: the neighbours of a body's particle, surface normals, tangential slips, spins. Out: a [`Touch`]: force, the couple
 //! of forces that act at the middle between two particles, the slip that friction remembers, what was counted.
 
-use super::forces::{Input, wrap};
+use super::forces::Input;
+use super::pairs::wrap;
 use crate::integrate::sleep::Rest;
 use crate::laws::contact;
 use crate::model::Model;

@@ -3,9 +3,9 @@
 //! In: sorted records. Out: neighbour runs; `density`. Volumes weigh the sum, so that walls, bodies and fluids of
 //! any rest density stand in it side by side: `D_i = sum_j V_j W_ij`.
 
-use super::lanes::{LANES, Lanes, sum};
-use super::neighbours::{Around, NeighbourChunk, Runs, Scratch};
-use crate::laws::kernel::Kernel;
+use super::lanes::{Block, LANES, Lanes, sum};
+use super::neighbours::{Around, NeighbourChunk, Scratch};
+use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
 use crate::scene::Coupling;
 use crate::state::{Kind, Record};
@@ -39,12 +39,19 @@ pub fn fluid_chunk<S: Simd>(
         Kind::Fluid,
         members,
         #[inline(always)]
-        |cell, runs, list, r_sq, base| {
+        |cell, runs, list, r_sq| {
+            weigh(kernel, inverse, bytemuck::cast_slice_mut(r_sq));
+            let (w, list) = (&*r_sq, list.as_chunks::<LANES>().0);
+            let base = runs[0].padded(Kind::Fluid).start;
             for (i, runs) in cell.zip(runs) {
-                let mut total = volume * sum_w(simd, kernel, inverse, r_sq, shifted(runs, Kind::Fluid, base));
+                let run = |kind| {
+                    let run = runs.padded(kind);
+                    (run.start - base) / LANES..(run.end - base) / LANES
+                };
+                let mut total = volume * sum_w(simd, &w[run(Kind::Fluid)]);
                 for &kind in bodies {
                     if runs.count(kind) > 0 {
-                        total += sum_vw(simd, kernel, inverse, r_sq, list, runs.padded(kind), base, around.records);
+                        total += sum_vw(simd, &w[run(kind)], &list[run(kind)], around.records);
                     }
                 }
                 density[i - start] = factor * total;
@@ -63,23 +70,26 @@ pub fn body_chunk<S: Simd>(
     members: Range<usize>,
     chunk: &mut NeighbourChunk,
 ) {
-    chunk.find(simd, scratch, around, kind, members, |_, _, _, _, _| {});
+    chunk.find(simd, scratch, around, kind, members, |_, _, _, _| {});
 }
 
+/// Squared distances become `w(s)`, in one flat loop: of short loops over sixteen lanes the compiler makes scalars.
 #[inline(always)]
-fn shifted(runs: &Runs, kind: Kind, base: usize) -> Range<usize> {
-    let r = runs.padded(kind);
-    r.start - base..r.end - base
+fn weigh(kernel: Kernel, inverse: f32, r_sq: &mut [f32]) {
+    each_kernel!(kernel, K => {
+        for r in r_sq {
+            *r = K.w(r.sqrt() * inverse);
+        }
+    });
 }
 
 /// `sum w(s)` over a run of equal volumes.
 #[inline(always)]
-fn sum_w<S: Simd>(simd: S, kernel: Kernel, inverse: f32, r_sq: &[f32], run: Range<usize>) -> f32 {
+fn sum_w<S: Simd>(simd: S, w: &[Block]) -> f32 {
     let mut total: Lanes = [0.0; LANES];
-    for block in r_sq[run].as_chunks::<LANES>().0 {
-        let w = weights(kernel, inverse, block);
+    for w in w {
         for l in 0..LANES {
-            total[l] += w[l];
+            total[l] += w.0[l];
         }
     }
     sum(simd, &total)
@@ -87,23 +97,11 @@ fn sum_w<S: Simd>(simd: S, kernel: Kernel, inverse: f32, r_sq: &[f32], run: Rang
 
 /// `sum V_j w(s)` over a run.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn sum_vw<S: Simd>(
-    simd: S,
-    kernel: Kernel,
-    inverse: f32,
-    r_sq: &[f32],
-    list: &[u32],
-    run: Range<usize>,
-    base: usize,
-    records: &[Record],
-) -> f32 {
+fn sum_vw<S: Simd>(simd: S, w: &[Block], list: &[[u32; LANES]], records: &[Record]) -> f32 {
     let mut total: Lanes = [0.0; LANES];
-    let blocks = list[run.clone()].as_chunks::<LANES>().0;
-    for (block, j) in r_sq[run.start - base..run.end - base].as_chunks::<LANES>().0.iter().zip(blocks) {
-        let w = weights(kernel, inverse, block);
+    for (w, j) in w.iter().zip(list) {
         for l in 0..LANES {
-            total[l] += w[l] * records[j[l] as usize].volume;
+            total[l] += w.0[l] * records[j[l] as usize].volume;
         }
     }
     sum(simd, &total)
@@ -112,37 +110,7 @@ fn sum_vw<S: Simd>(
 /// `w(s)` of sixteen squared distances.
 #[inline(always)]
 pub fn weights(kernel: Kernel, inverse: f32, r_sq: &Lanes) -> Lanes {
-    let mut s = [0.0; LANES];
-    for l in 0..LANES {
-        s[l] = r_sq[l].sqrt() * inverse;
-    }
-    each_lane(
-        kernel,
-        &s,
-        #[inline(always)]
-        |k, s| k.w(s),
-    )
-}
-
-/// A kernel function on sixteen lanes: the choice of kernel is made outside the lane loop.
-#[inline(always)]
-pub fn each_lane(kernel: Kernel, s: &Lanes, f: impl Fn(Kernel, f32) -> f32) -> Lanes {
-    macro_rules! lanes {
-        ($kernel:expr) => {{
-            let mut out = [0.0; LANES];
-            for l in 0..LANES {
-                out[l] = f($kernel, s[l]);
-            }
-            out
-        }};
-    }
-    match kernel {
-        Kernel::Cubic => lanes!(Kernel::Cubic),
-        Kernel::WendlandC2 => lanes!(Kernel::WendlandC2),
-        Kernel::WendlandC4 => lanes!(Kernel::WendlandC4),
-        Kernel::Quintic => lanes!(Kernel::Quintic),
-        Kernel::Poly6 => lanes!(Kernel::Poly6),
-        Kernel::Spiky => lanes!(Kernel::Spiky),
-        Kernel::Viscosity => lanes!(Kernel::Viscosity),
-    }
+    let mut w = *r_sq;
+    weigh(kernel, inverse, &mut w);
+    w
 }

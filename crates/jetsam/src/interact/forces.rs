@@ -1,15 +1,17 @@
-//! Stage `forces`: every law of pairs, evaluated from both ends of each pair (E4-E6, E10-E12, E16, E17, E30).
+//! Stage `forces`: every law of pairs, evaluated from both ends of each pair (E4-E8, E10-E12, E16, E17, E30).
 //!
 //! In: neighbour runs, records with pressure shares. Out: `push`, an acceleration (m/s^2) for fluids and a force
-//! (N) for the particles of bodies, `touch`, of what that force consists, and `carry` for XSPH.
+//! (N) for the particles of bodies; `touch`, of what that force consists; `carry` for XSPH, shifting and the rate of density. Sums over SPH pairs are in [`super::pairs`], contacts of
+//! bodies in [`super::contacts`].
 
 use super::contacts::{self, Friction, Surfaces};
-use super::density::{each_lane, weights};
-use super::lanes::{LANES, Lanes, gather, sum};
+use super::gradients::confinement;
+use super::lanes::{LANES, Listed};
 use super::neighbours::{NeighbourChunk, Runs};
-use crate::laws::{contact, field, fluid, kernel::Kernel};
+use super::pairs::{Ends, Pairs, Terms, wrap};
+use crate::laws::{contact, field};
 use crate::model::Model;
-use crate::scene::{Coupling, Damping, Force, Viscosity};
+use crate::scene::{Coupling, Damping, Force};
 use crate::state::{Kind, Record, Touch};
 use fearless_simd::Simd;
 use glam::{DVec3, Vec3};
@@ -21,6 +23,10 @@ pub struct Input<'a> {
     pub model: &'a Model,
     /// All particles.
     pub records: &'a [Record],
+    /// Velocities that bodies' particles show to viscosity (m/s); empty where they show their own.
+    pub mirror: &'a [[f32; 4]],
+    /// Colour gradients and vorticities of fluids; empty where they are not asked for.
+    pub gradient: &'a [[f32; 4]],
     /// Owners of all particles.
     pub owner: &'a [u32],
     /// First index of the chunk.
@@ -33,86 +39,130 @@ pub struct Input<'a> {
     pub gravity: Vec3,
     /// Length of the step (s).
     pub dt: f32,
+    /// Largest speed of any particle (m/s), for shifting.
+    pub fastest: f32,
 }
 
-/// Forces on a chunk of particles of one kind.
+/// Forces on a chunk of particles of one kind. `carry` may be empty.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)] // one caller
 pub fn chunk<S: Simd>(
     simd: S,
     input: Input,
     kind: Kind,
     chunk: &NeighbourChunk,
     push: &mut [[f32; 3]],
-    carry: &mut [[f32; 3]],
+    carry: &mut [[f32; 4]],
+    vorticity: &mut [[f32; 3]],
     touch: &mut [Touch],
 ) {
+    // most scenes ask for no more than pressure and viscosity: the rest is then not even compiled in
+    if input.model.plain() && input.mirror.is_empty() {
+        particles::<S, true>(simd, input, kind, chunk, push, carry, vorticity, touch);
+    } else {
+        particles::<S, false>(simd, input, kind, chunk, push, carry, vorticity, touch);
+    }
+}
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)] // one caller
+fn particles<S: Simd, const PLAIN: bool>(
+    simd: S,
+    input: Input,
+    kind: Kind,
+    chunk: &NeighbourChunk,
+    push: &mut [[f32; 3]],
+    carry: &mut [[f32; 4]],
+    vorticity: &mut [[f32; 3]],
+    touch: &mut [Touch],
+) {
+    let listed = Listed::new(simd, input.records, chunk.list());
     for (k, runs) in chunk.runs.iter().enumerate() {
         let i = input.first + k;
-        if kind == Kind::Fluid {
-            let (force, carried) = on_fluid(simd, &input, chunk, runs, i);
-            push[k] = force.to_array();
-            if let Some(c) = carry.get_mut(k) {
-                *c = carried.to_array();
-            }
-        } else {
-            (push[k], touch[k]) = on_body(simd, &input, kind, chunk, runs, i);
+        if kind != Kind::Fluid {
+            (push[k], touch[k]) = on_body::<S, PLAIN>(simd, &input, kind, listed, runs, i);
+            continue;
+        }
+        let (pairs, mut total) = on_fluid::<S, PLAIN>(simd, &input, listed, runs, i);
+        if input.model.solver.vorticity > 0.0 {
+            let confined = confinement(input.model, pairs.growth(simd), Vec3::from(vorticity[k]));
+            total += confined;
+            vorticity[k] = confined.to_array();
+        }
+        push[k] = total.to_array();
+        if let Some(carry) = carry.get_mut(k) {
+            let [x, y, z] = pairs.carry(simd, input.fastest).to_array();
+            *carry = [x, y, z, pairs.rate(simd)];
         }
     }
 }
 
-/// Acceleration of a fluid particle, and its XSPH velocity.
+/// Sums over the pairs of a fluid particle, and its acceleration.
 #[inline(always)]
-fn on_fluid<S: Simd>(simd: S, input: &Input, chunk: &NeighbourChunk, runs: &Runs, i: usize) -> (Vec3, Vec3) {
+fn on_fluid<'a, S: Simd, const PLAIN: bool>(
+    simd: S,
+    input: &Input<'a>,
+    listed: Listed<'a>,
+    runs: &Runs,
+    i: usize,
+) -> (Pairs<'a>, Vec3) {
     let model = input.model;
     let own = &input.records[i];
     let owner = input.owner[i];
     let me = &model.fluids[owner as usize];
-    let mut pairs = Pairs::new(model, own);
-    let run = |kind| chunk.list[runs.padded(kind)].as_chunks::<LANES>().0;
-    for list in run(Kind::Fluid) {
-        let (mu_sum, eta) = if model.fluids.len() == 1 {
-            ([2.0 * me.viscosity; LANES], [me.artificial; LANES])
-        } else {
-            let other = |l: usize| &model.fluids[input.owner[list[l] as usize] as usize];
-            (
-                std::array::from_fn(|l| me.viscosity + other(l).viscosity),
-                std::array::from_fn(|l| 0.5 * (me.artificial + other(l).artificial)),
-            )
-        };
-        pairs.add(simd, input.records, list, &mu_sum, &eta, model.solver.xsph);
+    let mut pairs = Pairs::new(input, i, Some(owner));
+    let run = |kind| listed.run(runs.padded(kind));
+    let mut terms = Terms {
+        mu_sum: [2.0 * me.viscosity; LANES],
+        eta: [me.artificial; LANES],
+        same: [1.0; LANES],
+        cohesion: me.cohesion,
+        curvature: me.curvature,
+    };
+    for near in run(Kind::Fluid) {
+        if model.fluids.len() > 1 {
+            for l in 0..LANES {
+                let other = input.owner[near.index[l] as usize];
+                terms.same[l] = if other == owner { 1.0 } else { 0.0 };
+                let other = &model.fluids[other as usize];
+                terms.mu_sum[l] = me.viscosity + other.viscosity;
+                terms.eta[l] = 0.5 * (me.artificial + other.artificial);
+            }
+        }
+        pairs.add::<S, PLAIN>(simd, near, Ends::Fluids, &terms);
     }
-    // walls: no slip by the fluid's own viscosity, none by the artificial one
-    let mu_sum = [2.0 * me.viscosity; LANES];
-    for list in run(Kind::Static) {
-        pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);
+    // walls: the fluid's own viscosity acts (unless they are free of it), the artificial one does not
+    let mu = if model.solver.walls_slip { 0.0 } else { 2.0 * me.viscosity };
+    let terms = Terms { mu_sum: [mu; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
+    for near in run(Kind::Static) {
+        pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
     }
-    for &j in &chunk.list[runs.exact(Kind::Rigid)] {
+    for &j in listed.indices(runs.exact(Kind::Rigid)) {
         input.surfaces.wet(input.owner[j as usize]);
     }
     if model.solver.coupling == Coupling::Pressure {
-        for list in run(Kind::Rigid) {
-            pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);
+        for near in run(Kind::Rigid) {
+            pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
         }
     }
     let mut contacts = Vec3::ZERO;
     for kind in [Kind::Rigid, Kind::Static] {
         if springs(model, kind, own) {
-            let list = &chunk.list[runs.exact(kind)];
+            let list = listed.indices(runs.exact(kind));
             contacts += sum_contacts(input, own, list, |(_, body)| Some(model.coupling_pair(owner, body)));
         }
     }
-    let mut acceleration = (pairs.force(simd) + contacts) / me.mass + input.gravity;
-    acceleration += fields(model, own);
-    (acceleration, pairs.carry(simd))
+    let push = (pairs.force(simd) + contacts) / me.mass + input.gravity + fields(model, own);
+    (pairs, push)
 }
 
 /// Force on a particle of a body, and of what it consists.
 #[inline(always)]
-fn on_body<S: Simd>(
+fn on_body<S: Simd, const PLAIN: bool>(
     simd: S,
     input: &Input,
     kind: Kind,
-    chunk: &NeighbourChunk,
+    listed: Listed,
     runs: &Runs,
     i: usize,
 ) -> ([f32; 3], Touch) {
@@ -121,28 +171,29 @@ fn on_body<S: Simd>(
     let owner = input.owner[i];
     let mut force = Vec3::ZERO;
     if kind == Kind::Static || model.solver.coupling == Coupling::Pressure {
-        let mut pairs = Pairs::new(model, own);
-        for list in chunk.list[runs.padded(Kind::Fluid)].as_chunks::<LANES>().0 {
-            let mu_sum = if model.fluids.len() == 1 {
-                [2.0 * model.fluids[0].viscosity; LANES]
-            } else {
-                // padding names the particle itself, whose owner is a body
-                std::array::from_fn(|l| {
-                    model.fluids.get(input.owner[list[l] as usize] as usize).map_or(0.0, |f| 2.0 * f.viscosity)
-                })
-            };
-            pairs.add(simd, input.records, list, &mu_sum, &[0.0; LANES], 0.0);
+        let mut pairs = Pairs::new(input, i, None);
+        let mut terms =
+            Terms { mu_sum: [0.0; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
+        for near in listed.run(runs.padded(Kind::Fluid)) {
+            if !model.solver.walls_slip {
+                for l in 0..LANES {
+                    // padding names the particle itself, whose owner is a body
+                    let fluid = if model.fluids.len() == 1 { 0 } else { input.owner[near.index[l] as usize] };
+                    terms.mu_sum[l] = model.fluids.get(fluid as usize).map_or(0.0, |f| 2.0 * f.viscosity);
+                }
+            }
+            pairs.add::<S, PLAIN>(simd, near, Ends::OnBody, &terms);
         }
         force += pairs.force(simd);
     }
-    let fluids = &chunk.list[runs.exact(Kind::Fluid)];
+    let fluids = listed.indices(runs.exact(Kind::Fluid));
     force += sum_contacts(input, own, fluids, |(other, fluid)| {
         springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
     });
     let mut touch = Touch { fluid: force.to_array(), ..Touch::default() };
     let mut friction = Friction::default();
     for other in [Kind::Rigid, Kind::Static] {
-        contacts::add(input, i, &chunk.list[runs.exact(other)], &mut touch, &mut friction);
+        contacts::add(input, i, listed.indices(runs.exact(other)), &mut touch, &mut friction);
     }
     force += Vec3::from(touch.contact);
     if model.moves(owner) {
@@ -208,156 +259,4 @@ pub fn fields(model: &Model, own: &Record) -> Vec3 {
         total.y = 0.0;
     }
     total
-}
-
-/// A difference of places, by the shortest way on periodic axes.
-#[inline(always)]
-pub fn wrap(model: &Model, mut d: Vec3) -> Vec3 {
-    for a in 0..3 {
-        let period = model.grid.period[a];
-        if period > 0.0 {
-            d[a] = shortest(d[a], period);
-        }
-    }
-    d
-}
-
-#[inline(always)]
-fn shortest(d: f32, period: f32) -> f32 {
-    let half = 0.5 * period;
-    let over = if d > half { period } else { 0.0 };
-    let under = if d < -half { period } else { 0.0 };
-    d - over + under
-}
-
-/// `d_ij` and its square for sixteen neighbours, by the shortest way on periodic axes.
-#[inline(always)]
-pub fn wrap_lanes(model: &Model, x: [f32; 3], other: &[Lanes; 3]) -> ([Lanes; 3], Lanes) {
-    let mut d = [[0.0; LANES]; 3];
-    for a in 0..3 {
-        for l in 0..LANES {
-            d[a][l] = other[a][l] - x[a];
-        }
-        let period = model.grid.period[a];
-        if period > 0.0 {
-            for l in 0..LANES {
-                d[a][l] = shortest(d[a][l], period);
-            }
-        }
-    }
-    let mut r_sq = [0.0; LANES];
-    for l in 0..LANES {
-        r_sq[l] = d[0][l] * d[0][l] + d[1][l] * d[1][l] + d[2][l] * d[2][l];
-    }
-    (d, r_sq)
-}
-
-/// Sum of SPH pair forces on one particle (E4, E5) and of its XSPH velocity (E6), lane by lane.
-struct Pairs<'a> {
-    model: &'a Model,
-    own: &'a Record,
-    kernel: Kernel,
-    g_factor: f32,
-    w_factor: f32,
-    inverse: f32,
-    softening: f32,
-    mueller: Option<f32>,
-    force: [Lanes; 3],
-    carry: [Lanes; 3],
-}
-
-impl<'a> Pairs<'a> {
-    #[inline(always)]
-    fn new(model: &'a Model, own: &'a Record) -> Self {
-        let kernel = model.kernel.force();
-        Self {
-            model,
-            own,
-            kernel,
-            g_factor: model.factors.g,
-            w_factor: model.factors.w,
-            inverse: model.inverse_support(),
-            softening: model.softening(),
-            mueller: (model.solver.viscosity == Viscosity::Mueller).then_some(model.factors.laplacian),
-            force: [[0.0; LANES]; 3],
-            carry: [[0.0; LANES]; 3],
-        }
-    }
-
-    /// Adds sixteen neighbours. `mu_sum = mu_i + mu_j` and `eta` (Pa s) per lane.
-    #[inline(always)]
-    fn add<S: Simd>(
-        &mut self,
-        simd: S,
-        records: &[Record],
-        list: &[u32; LANES],
-        mu_sum: &Lanes,
-        eta: &Lanes,
-        xsph: f64,
-    ) {
-        let own = self.own;
-        let other = gather(simd, records, list);
-        let (d, r_sq) = wrap_lanes(self.model, own.x, &other.x);
-        let mut v = [[0.0; LANES]; 3];
-        for a in 0..3 {
-            for l in 0..LANES {
-                v[a][l] = other.v[a][l] - own.v[a];
-            }
-        }
-        let mut s = [0.0; LANES];
-        for l in 0..LANES {
-            s[l] = r_sq[l].sqrt() * self.inverse;
-        }
-        let shape = each_lane(
-            self.kernel,
-            &s,
-            #[inline(always)]
-            |k, s| k.g(s),
-        );
-        let (mut along_d, mut along_v) = ([0.0; LANES], [0.0; LANES]);
-        for l in 0..LANES {
-            let g = self.g_factor * shape[l];
-            let volumes = own.volume * other.volume[l];
-            let v_dot_d = v[0][l] * d[0][l] + v[1][l] * d[1][l] + v[2][l] * d[2][l];
-            along_d[l] = fluid::pressure_force(volumes, own.share, other.share[l], g)
-                + fluid::viscosity_artificial(volumes, eta[l], v_dot_d, r_sq[l], self.softening, g);
-            along_v[l] = fluid::viscosity_laminar(volumes, mu_sum[l], r_sq[l], self.softening, g);
-        }
-        if let Some(factor) = self.mueller {
-            let laplacian = each_lane(
-                Kernel::Viscosity,
-                &s,
-                #[inline(always)]
-                |k, s| k.g(s),
-            );
-            for l in 0..LANES {
-                let volumes = own.volume * other.volume[l];
-                along_v[l] = fluid::viscosity_mueller(volumes, mu_sum[l], factor * laplacian[l]);
-            }
-        }
-        for a in 0..3 {
-            for l in 0..LANES {
-                self.force[a][l] += along_d[l] * d[a][l] + along_v[l] * v[a][l];
-            }
-        }
-        if xsph > 0.0 {
-            let w = weights(self.model.kernel.density(), self.inverse, &r_sq);
-            for a in 0..3 {
-                for l in 0..LANES {
-                    let share = fluid::xsph(xsph as f32, other.volume[l], self.w_factor * w[l]);
-                    self.carry[a][l] += share * v[a][l];
-                }
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn force<S: Simd>(&self, simd: S) -> Vec3 {
-        Vec3::new(sum(simd, &self.force[0]), sum(simd, &self.force[1]), sum(simd, &self.force[2]))
-    }
-
-    #[inline(always)]
-    fn carry<S: Simd>(&self, simd: S) -> Vec3 {
-        Vec3::new(sum(simd, &self.carry[0]), sum(simd, &self.carry[1]), sum(simd, &self.carry[2]))
-    }
 }

@@ -2,10 +2,16 @@
 //! the compiler turns into full-width instructions under run-time dispatch.
 //!
 //! The width is 16 on every machine, so that all of them add in the same order and give the same bits.
+//!
+//! The only file with `unsafe`: the two innermost loops of a step, the search and the gather, store and load at
+//! places that depend on data. A bounds check for each costs a tenth of the stage; here room and indices are
+//! asserted once for whole loops and whole vectors.
+#![allow(unsafe_code)]
 
 use crate::state::Record;
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x8, f32x16};
+use fearless_simd::{f32x8, f32x16, u32x16};
 
 /// Lanes handled at once.
 pub const LANES: usize = 16;
@@ -18,6 +24,109 @@ pub fn padded(n: usize) -> usize {
     n.next_multiple_of(LANES)
 }
 
+/// Sixteen values on a cache line of their own: a load that straddles two lines costs twice.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Block(pub Lanes);
+
+/// Sixteen indices, alike.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Indices(pub [u32; LANES]);
+
+/// Copies `len` points from `begin` on, moved by `shift`, to `at`, and their indices: by whole vectors, so that up to
+/// fifteen numbers beyond `len` are read and written.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub fn pack<S: Simd>(
+    simd: S,
+    from: &[Vec<f32>; 3],
+    begin: usize,
+    shift: [f32; 3],
+    to: &mut [Vec<Block>; 3],
+    index: &mut [Indices],
+    at: usize,
+    len: usize,
+) {
+    let (read, write) = (begin + padded(len), at + padded(len));
+    assert!(from.iter().all(|x| read <= x.len()) && to.iter().all(|x| write <= LANES * x.len()));
+    assert!(write <= LANES * index.len());
+    let from = from.each_ref().map(|x| x.as_ptr());
+    let to = to.each_mut().map(|x| x.as_mut_ptr().cast::<f32>());
+    let index = index.as_mut_ptr().cast::<u32>();
+    let shift = shift.map(|c| f32x16::splat(simd, c));
+    let mut next = u32x16::from_fn(simd, |l| l as u32) + u32x16::splat(simd, begin as u32);
+    for k in (0..len).step_by(LANES) {
+        // SAFETY: k + 16 <= padded(len), and the ends are asserted above
+        unsafe {
+            for a in 0..3 {
+                let x = f32x16::load_array_ref(simd, &*from[a].add(begin + k).cast());
+                (x + shift[a]).store_array(&mut *to[a].add(at + k).cast());
+            }
+            next.store_array(&mut *index.add(at + k).cast());
+        }
+        next += u32x16::splat(simd, LANES as u32);
+    }
+}
+
+/// Points to search, in whole vectors; all slices are equally long.
+#[derive(Clone, Copy)]
+pub struct Candidates<'a> {
+    /// Positions (m), axis by axis.
+    pub x: [&'a [Block]; 3],
+    /// What is listed of a point that is near.
+    pub index: &'a [Indices],
+    /// Whose the points are.
+    pub owner: &'a [Indices],
+}
+
+/// Appends to `list` the indices of the candidates closer to `x` than the root of `limit`, in their order, and to
+/// `r_sq` their squared distances; fills up whole vectors with `pad` at the distance of the limit. Returns how many
+/// are near. Points of the owner `not` are passed over. Both lists need room for all candidates and a vector more.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub fn near<S: Simd>(
+    simd: S,
+    candidates: &Candidates,
+    x: [f32; 3],
+    limit: f32,
+    not: Option<u32>,
+    pad: u32,
+    list: &mut [u32],
+    r_sq: &mut [f32],
+) -> usize {
+    let Candidates { x: [tile_x, tile_y, tile_z], index, owner } = *candidates;
+    let room = LANES * (tile_x.len() + 1);
+    assert!(list.len() >= room && r_sq.len() >= room);
+    let (list, r_sq) = (list.as_mut_ptr(), r_sq.as_mut_ptr());
+    let [x, y, z] = x.map(|c| f32x16::splat(simd, c));
+    let limit = f32x16::splat(simd, limit);
+    let mut n = 0;
+    for ((((tile_x, tile_y), tile_z), index), owner) in tile_x.iter().zip(tile_y).zip(tile_z).zip(index).zip(owner) {
+        let d_x = f32x16::load_array_ref(simd, &tile_x.0) - x;
+        let d_y = f32x16::load_array_ref(simd, &tile_y.0) - y;
+        let d_z = f32x16::load_array_ref(simd, &tile_z.0) - z;
+        let r = d_x * d_x + d_y * d_y + d_z * d_z;
+        let mut near = r.simd_lt(limit);
+        if let Some(own) = not {
+            near &= !u32x16::load_array_ref(simd, &owner.0).simd_eq(u32x16::splat(simd, own));
+        }
+        let index = u32x16::load_array_ref(simd, &index.0);
+        // SAFETY: after k vectors n <= 16 k, and there is room for all of them and one more
+        unsafe {
+            simd.compress_u32x16(index, near).store_array(&mut *list.add(n).cast());
+            simd.compress_f32x16(r, near).store_array(&mut *r_sq.add(n).cast());
+        }
+        n += simd.to_bitmask_mask32x16(near).count_ones() as usize;
+    }
+    // SAFETY: as above; this is the one more
+    unsafe {
+        u32x16::splat(simd, pad).store_array(&mut *list.add(n).cast());
+        limit.store_array(&mut *r_sq.add(n).cast());
+    }
+    n
+}
+
 /// Sum of the lanes in a fixed order: halves onto each other. By hand, as the compiler would not unroll it.
 #[inline(always)]
 pub fn sum<S: Simd>(simd: S, a: &Lanes) -> f32 {
@@ -25,6 +134,63 @@ pub fn sum<S: Simd>(simd: S, a: &Lanes) -> f32 {
     let (low, high) = (low + high).split();
     let v = (low + high).to_array();
     (v[0] + v[2]) + (v[1] + v[3])
+}
+
+/// `a - b` lane by lane.
+#[inline(always)]
+pub fn minus<S: Simd>(simd: S, a: &Lanes, b: f32) -> Lanes {
+    (f32x16::load_array_ref(simd, a) - f32x16::splat(simd, b)).to_array()
+}
+
+/// `x^2 + y^2 + z^2` lane by lane.
+#[inline(always)]
+pub fn squares<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> Lanes {
+    let [x, y, z] = [x, y, z].map(|c| f32x16::load_array_ref(simd, c));
+    (x * x + y * y + z * z).to_array()
+}
+
+/// Particles and a list of indices into them, which are checked once for all.
+#[derive(Clone, Copy)]
+pub struct Listed<'a> {
+    records: &'a [Record],
+    list: &'a [u32],
+}
+
+/// Sixteen neighbours out of a checked list.
+#[derive(Clone, Copy)]
+pub struct Near<'a> {
+    records: &'a [Record],
+    /// Their indices.
+    pub index: &'a [u32; LANES],
+}
+
+impl<'a> Listed<'a> {
+    /// A list of whole vectors.
+    ///
+    /// # Panics
+    /// If an index is not below the number of records: a defect of the search.
+    #[inline(always)]
+    pub fn new<S: Simd>(simd: S, records: &'a [Record], list: &'a [u32]) -> Self {
+        let mut largest = u32x16::splat(simd, 0);
+        for block in list.as_chunks().0 {
+            largest = largest.max(u32x16::load_array_ref(simd, block));
+        }
+        let inside = largest.simd_lt(u32x16::splat(simd, records.len() as u32));
+        assert!(list.is_empty() || list.len() % LANES == 0 && simd.to_bitmask_mask32x16(inside) == 0xffff);
+        Self { records, list }
+    }
+
+    /// Part of the list as it is.
+    #[inline(always)]
+    pub fn indices(self, run: std::ops::Range<usize>) -> &'a [u32] {
+        &self.list[run]
+    }
+
+    /// Part of the list, vector by vector.
+    #[inline(always)]
+    pub fn run(self, run: std::ops::Range<usize>) -> impl Iterator<Item = Near<'a>> {
+        self.list[run].as_chunks().0.iter().map(move |index| Near { records: self.records, index })
+    }
 }
 
 /// Sixteen records side by side.
@@ -39,18 +205,18 @@ pub struct Transposed {
     pub share: Lanes,
 }
 
-/// Loads the records named by 16 indices: 16 whole-record loads and three rounds of unzipping.
+/// Loads sixteen records: 16 whole-record loads and three rounds of unzipping.
 #[inline(always)]
-pub fn gather<S: Simd>(simd: S, records: &[Record], list: &[u32; LANES]) -> Transposed {
+pub fn gather<S: Simd>(simd: S, near: Near) -> Transposed {
     let r = [
-        pair(simd, records, list[0], list[1]),
-        pair(simd, records, list[2], list[3]),
-        pair(simd, records, list[4], list[5]),
-        pair(simd, records, list[6], list[7]),
-        pair(simd, records, list[8], list[9]),
-        pair(simd, records, list[10], list[11]),
-        pair(simd, records, list[12], list[13]),
-        pair(simd, records, list[14], list[15]),
+        pair(simd, near, 0),
+        pair(simd, near, 2),
+        pair(simd, near, 4),
+        pair(simd, near, 6),
+        pair(simd, near, 8),
+        pair(simd, near, 10),
+        pair(simd, near, 12),
+        pair(simd, near, 14),
     ];
     // component c = 4 c2 + 2 c1 + c0: the first round splits by c0, the second by c1, the third by c2
     let (a0, b0) = unzip(r[0], r[1]);
@@ -73,13 +239,15 @@ pub fn gather<S: Simd>(simd: S, records: &[Record], list: &[u32; LANES]) -> Tran
 
 /// Two records in one vector.
 #[inline(always)]
-fn pair<S: Simd>(simd: S, records: &[Record], a: u32, b: u32) -> f32x16<S> {
-    row(simd, records, a).combine(row(simd, records, b))
+fn pair<S: Simd>(simd: S, near: Near, k: usize) -> f32x16<S> {
+    row(simd, near, k).combine(row(simd, near, k + 1))
 }
 
 #[inline(always)]
-fn row<S: Simd>(simd: S, records: &[Record], index: u32) -> f32x8<S> {
-    f32x8::load_array_ref(simd, bytemuck::cast_ref::<Record, [f32; 8]>(&records[index as usize]))
+fn row<S: Simd>(simd: S, near: Near, k: usize) -> f32x8<S> {
+    // SAFETY: `Listed::new` has compared the indices with the number of these very records
+    let record = unsafe { near.records.get_unchecked(near.index[k] as usize) };
+    f32x8::load_array_ref(simd, bytemuck::cast_ref::<Record, [f32; 8]>(record))
 }
 
 /// Even and odd elements of two vectors on end.
@@ -99,7 +267,10 @@ mod tests {
             .map(|i| bytemuck::cast::<[f32; 8], Record>(std::array::from_fn(|c| (100 * i + c) as f32)))
             .collect();
         let list: [u32; LANES] = std::array::from_fn(|l| (l * 7 % 40) as u32);
-        let t = dispatch!(Level::new(), simd => gather(simd, &records, &list));
+        let t = dispatch!(Level::new(), simd => {
+            let listed = Listed::new(simd, &records, &list);
+            gather(simd, listed.run(0..LANES).next().unwrap())
+        });
         for (l, &j) in list.iter().enumerate() {
             let r = records[j as usize];
             assert_eq!([t.x[0][l], t.x[1][l], t.x[2][l]], r.x);

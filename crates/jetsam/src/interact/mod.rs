@@ -7,8 +7,10 @@ pub mod cells;
 pub mod contacts;
 pub mod density;
 pub mod forces;
+pub mod gradients;
 pub mod lanes;
 pub mod neighbours;
+pub mod pairs;
 pub mod pressure;
 
 /// Particles handled as one parallel task. Fixed: sums over tasks are added in task order, so that no result

@@ -6,10 +6,9 @@
 //! tested sixteen at a time.
 
 use super::cells::{Cells, Grid};
-use super::lanes::{LANES, padded};
+use super::lanes::{Block, Candidates, Indices, LANES, near, pack, padded};
 use crate::state::{Kind, Record};
-use fearless_simd::prelude::*;
-use fearless_simd::{f32x16, u32x16};
+use fearless_simd::Simd;
 use std::cell::RefCell;
 use std::ops::Range;
 
@@ -31,11 +30,14 @@ impl Runs {
     /// Where the run of a kind stands in the chunk's list, padding included.
     #[inline(always)]
     pub fn padded(&self, kind: Kind) -> Range<usize> {
-        let mut begin = self.begin as usize;
-        for k in 0..kind as usize {
-            begin += padded(self.count[k] as usize);
-        }
-        begin..begin + padded(self.count[kind as usize] as usize)
+        let length = |k| padded(self.count(k));
+        let begin = self.begin as usize
+            + match kind {
+                Kind::Fluid => 0,
+                Kind::Rigid => length(Kind::Fluid),
+                Kind::Static => length(Kind::Fluid) + length(Kind::Rigid),
+            };
+        begin..begin + length(kind)
     }
 
     /// Where the run of a kind stands in the chunk's list, neighbours only.
@@ -49,20 +51,35 @@ impl Runs {
 /// Neighbours of a chunk of particles. Kept from step to step, so that nothing is allocated once sizes settle.
 #[derive(Clone, Debug, Default)]
 pub struct NeighbourChunk {
-    /// All runs, one after another.
-    pub list: Vec<u32>,
+    list: Vec<u32>,
+    used: usize,
     /// Runs of each particle of the chunk.
     pub runs: Vec<Runs>,
+    /// Whether any particle of the chunk has neighbours: most of a wall is far from everything.
+    pub found: bool,
 }
 
-/// Candidates around one cell.
+/// Positions in the order of the sort, axis by axis, so that runs of cells are packed by whole vectors. Written by
+/// `cells`; a vector longer than the particles, as the last run may be read beyond its end.
+#[derive(Clone, Debug, Default)]
+pub struct Places {
+    /// Positions (m).
+    pub x: [Vec<f32>; 3],
+}
+
+impl Places {
+    /// Places for `n` particles.
+    pub fn new(n: usize) -> Self {
+        Self { x: std::array::from_fn(|_| vec![0.0; n + LANES]) }
+    }
+}
+
+/// Candidates around one cell, in whole vectors.
 #[derive(Default)]
 struct Tile {
-    x: Vec<f32>,
-    y: Vec<f32>,
-    z: Vec<f32>,
-    index: Vec<u32>,
-    owner: Vec<u32>,
+    x: [Vec<Block>; 3],
+    index: Vec<Indices>,
+    owner: Vec<Indices>,
     len: usize,
 }
 
@@ -70,8 +87,7 @@ struct Tile {
 #[derive(Default)]
 pub struct Scratch {
     tile: [Tile; Kind::COUNT],
-    /// Squared distances (m^2) of the cell's runs, indexed from the first of them; `H^2` in the padding.
-    pub r_sq: Vec<f32>,
+    r_sq: Vec<Block>,
 }
 
 thread_local! {
@@ -93,6 +109,8 @@ pub struct Around<'a> {
     pub grid: &'a Grid,
     /// All particles.
     pub records: &'a [Record],
+    /// Their positions, axis by axis.
+    pub places: &'a Places,
     /// Owners of all particles.
     pub owner: &'a [u32],
     /// Where cells begin, kind by kind.
@@ -114,9 +132,15 @@ fn acting(kind: Kind) -> &'static [Kind] {
 }
 
 impl NeighbourChunk {
+    /// All runs, one after another.
+    #[inline(always)]
+    pub fn list(&self) -> &[u32] {
+        &self.list[..self.used]
+    }
+
     /// Finds the neighbours of the particles `members` (indices) of kind `kind`, and calls
-    /// `each_cell(members of the cell, their runs, list, r_sq, base)` after each cell, where the squared
-    /// distance of list entry `k` is `r_sq[k - base]`.
+    /// `each_cell(members of the cell, their runs, list, r_sq)` after each cell; list and squared distances (m^2; `H^2`
+    /// in the padding) are those of the cell alone and begin with the cell's first run.
     #[inline(always)]
     pub fn find<S: Simd>(
         &mut self,
@@ -125,37 +149,39 @@ impl NeighbourChunk {
         around: Around,
         kind: Kind,
         members: Range<usize>,
-        mut each_cell: impl FnMut(Range<usize>, &[Runs], &[u32], &[f32], usize),
+        mut each_cell: impl FnMut(Range<usize>, &[Runs], &[u32], &mut [Block]),
     ) {
         self.runs.clear();
+        self.found = false;
+        let limit = around.support * around.support;
         let mut used = 0;
         let mut from = members.start;
         while from < members.end {
             let cell = around.grid.coordinates(around.records[from].x);
-            let mut to = from + 1;
-            while to < members.end && around.grid.coordinates(around.records[to].x) == cell {
-                to += 1;
-            }
+            let to = members.end.min(around.first[kind as usize] + around.cells[kind as usize].end(cell));
             let asleep = |i: usize| kind == Kind::Rigid && around.asleep[around.owner[i] as usize];
-            if (from..to).all(asleep) {
-                self.runs.extend((from..to).map(|_| Runs { begin: used as u32, ..Runs::default() }));
+            let all_asleep = (from..to).all(asleep);
+            let mut candidates = 0;
+            for &k in if all_asleep { &[] } else { acting(kind) } {
+                scratch.tile[k as usize].pack(simd, &around, k, cell, (kind, k) == (Kind::Rigid, Kind::Rigid));
+                candidates += padded(scratch.tile[k as usize].len);
+            }
+            let first_run = self.runs.len();
+            if candidates == 0 {
+                let none = Runs { begin: used as u32, count: [0; Kind::COUNT] };
+                self.runs.resize(first_run + (to - from), none);
                 from = to;
                 continue;
             }
-            let mut candidates = 0;
-            for &k in acting(kind) {
-                scratch.tile[k as usize].pack(&around, k, cell);
-                candidates += padded(scratch.tile[k as usize].len);
-            }
+            self.found = true;
             let base = used;
-            let room = (to - from) * (candidates + LANES);
+            let room = (to - from) * (candidates + LANES) + LANES;
             if self.list.len() < base + room {
                 self.list.resize(base + room, 0);
             }
-            if scratch.r_sq.len() < room {
-                scratch.r_sq.resize(room, 0.0);
+            if scratch.r_sq.len() * LANES < room {
+                scratch.r_sq.resize(room.div_ceil(LANES), Block::default());
             }
-            let first_run = self.runs.len();
             for i in from..to {
                 let mut runs = Runs { begin: used as u32, count: [0; Kind::COUNT] };
                 for &k in if asleep(i) { &[] } else { acting(kind) } {
@@ -163,138 +189,107 @@ impl NeighbourChunk {
                     if tile.len == 0 {
                         continue;
                     }
-                    let not = if kind == Kind::Rigid && k == Kind::Rigid { Some(around.owner[i]) } else { None };
-                    let (list, r_sq) = (&mut self.list[used..], &mut scratch.r_sq[used - base..]);
-                    let n = tile.search(simd, around.records[i].x, not, around.support, list, r_sq);
-                    for pad in n..padded(n) {
-                        list[pad] = i as u32;
-                        r_sq[pad] = around.support * around.support;
-                    }
+                    let not = if (kind, k) == (Kind::Rigid, Kind::Rigid) { Some(around.owner[i]) } else { None };
+                    let list = &mut self.list[used..];
+                    let r_sq = &mut bytemuck::cast_slice_mut(&mut scratch.r_sq)[used - base..];
+                    let n = near(simd, &tile.candidates(), around.records[i].x, limit, not, i as u32, list, r_sq);
                     runs.count[k as usize] = n as u16;
                     used += padded(n);
                 }
                 self.runs.push(runs);
             }
-            each_cell(from..to, &self.runs[first_run..], &self.list, &scratch.r_sq, base);
+            let r_sq = &mut scratch.r_sq[..(used - base) / LANES];
+            each_cell(from..to, &self.runs[first_run..], &self.list[base..used], r_sq);
             from = to;
         }
+        self.used = used;
     }
+}
+
+/// A run of particles that stands together in the sorted order, and how far to shift it (m).
+#[derive(Clone, Copy, Default)]
+struct Row {
+    begin: usize,
+    len: usize,
+    shift: [f32; 3],
 }
 
 impl Tile {
     /// Packs the particles of kind `kind` in the 27 cells around `cell`; periodic images are shifted into place.
     #[inline(always)]
-    fn pack(&mut self, around: &Around, kind: Kind, cell: [i32; 3]) {
+    fn pack<S: Simd>(&mut self, simd: S, around: &Around, kind: Kind, cell: [i32; 3], owners: bool) {
         self.len = 0;
-        let grid = around.grid;
-        let cells = around.cells[kind as usize];
+        let mut rows = [Row::default(); 27];
+        let count = around.rows(kind, cell, &mut rows);
+        let rows = &rows[..count];
+        let room = rows.iter().map(|r| r.len).sum::<usize>().div_ceil(LANES) + 1;
+        if rows.is_empty() {
+            return;
+        }
+        if self.index.len() < room {
+            self.x.iter_mut().for_each(|x| x.resize(room, Block::default()));
+            self.index.resize(room, Indices::default());
+            self.owner.resize(room, Indices::default());
+        }
+        let mut at = 0;
+        for row in rows {
+            pack(simd, &around.places.x, row.begin, row.shift, &mut self.x, &mut self.index, at, row.len);
+            if owners {
+                let owner: &mut [u32] = bytemuck::cast_slice_mut(&mut self.owner);
+                owner[at..at + row.len].copy_from_slice(&around.owner[row.begin..row.begin + row.len]);
+            }
+            at += row.len;
+        }
+        // far points fill the last vector: never closer than the support
+        bytemuck::cast_slice_mut::<_, f32>(&mut self.x[0])[at..padded(at)].fill(f32::MAX);
+        self.len = at;
+    }
+
+    #[inline(always)]
+    fn candidates(&self) -> Candidates<'_> {
+        let blocks = self.len.div_ceil(LANES);
+        Candidates {
+            x: self.x.each_ref().map(|x| &x[..blocks]),
+            index: &self.index[..blocks],
+            owner: &self.owner[..blocks],
+        }
+    }
+}
+
+impl Around<'_> {
+    /// The rows of kind `kind` in the 27 cells around `cell`; returns how many.
+    #[inline(always)]
+    fn rows(&self, kind: Kind, cell: [i32; 3], rows: &mut [Row; 27]) -> usize {
+        let mut count = 0;
+        let (grid, cells) = (self.grid, self.cells[kind as usize]);
+        if !cells.are_near(grid, cell) {
+            return 0;
+        }
+        let first = self.first[kind as usize];
+        let mut add = |from: i32, to: i32, y: i32, z: i32, shift: [f32; 3]| {
+            let run = cells.row(from, to, y, z);
+            if !run.is_empty() {
+                rows[count] = Row { begin: first + run.start, len: run.len(), shift };
+                count += 1;
+            }
+        };
         let reach = |a: usize| if grid.cells[a] == 1 && grid.period[a] == 0.0 { 0..=0 } else { -1..=1 };
         for dz in reach(2) {
             let Some((z, shift_z)) = image(grid, 2, cell[2] + dz) else { continue };
             for dy in reach(1) {
                 let Some((y, shift_y)) = image(grid, 1, cell[1] + dy) else { continue };
-                let row = [y, z];
                 let (low, high, last) = (cell[0] - 1, cell[0] + 1, grid.cells[0] - 1);
-                let shift = [0.0, shift_y, shift_z];
-                self.append(around, cells, kind, row, low.max(0), high.min(last), shift);
+                add(low.max(0), high.min(last), y, z, [0.0, shift_y, shift_z]);
                 let period = grid.period[0];
                 if period > 0.0 && low < 0 {
-                    self.append(around, cells, kind, row, last, last, [-period, shift_y, shift_z]);
+                    add(last, last, y, z, [-period, shift_y, shift_z]);
                 }
                 if period > 0.0 && high > last {
-                    self.append(around, cells, kind, row, 0, 0, [period, shift_y, shift_z]);
+                    add(0, 0, y, z, [period, shift_y, shift_z]);
                 }
             }
         }
-        // far points fill the last vector: never closer than the support
-        let end = padded(self.len);
-        self.reserve(end);
-        for l in self.len..end {
-            self.x[l] = f32::MAX;
-            self.y[l] = 0.0;
-            self.z[l] = 0.0;
-            self.index[l] = 0;
-            self.owner[l] = u32::MAX;
-        }
-    }
-
-    #[inline(always)]
-    fn reserve(&mut self, len: usize) {
-        if self.x.len() < len {
-            for a in [&mut self.x, &mut self.y, &mut self.z] {
-                a.resize(len, 0.0);
-            }
-            self.index.resize(len, 0);
-            self.owner.resize(len, 0);
-        }
-    }
-
-    /// Packs the cells `from..=to` of a row.
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments)] // one caller, three calls
-    fn append(
-        &mut self,
-        around: &Around,
-        cells: &Cells,
-        kind: Kind,
-        [y, z]: [i32; 2],
-        from: i32,
-        to: i32,
-        shift: [f32; 3],
-    ) {
-        let first = around.first[kind as usize];
-        let row = cells.row(from, to, y, z);
-        let (begin, end) = (first + row.start, first + row.end);
-        let (at, n) = (self.len, end - begin);
-        if n == 0 {
-            return;
-        }
-        self.len += n;
-        self.reserve(padded(self.len));
-        let (x, y, z) = (&mut self.x[at..at + n], &mut self.y[at..at + n], &mut self.z[at..at + n]);
-        let (index, owner) = (&mut self.index[at..at + n], &mut self.owner[at..at + n]);
-        let (records, owners) = (&around.records[begin..end], &around.owner[begin..end]);
-        for k in 0..n {
-            let r = &records[k];
-            x[k] = r.x[0] + shift[0];
-            y[k] = r.x[1] + shift[1];
-            z[k] = r.x[2] + shift[2];
-            index[k] = (begin + k) as u32;
-            owner[k] = owners[k];
-        }
-    }
-
-    /// Appends to `list` the candidates closer than `support` to `x` (of another owner than `not`), with their
-    /// squared distances; returns how many.
-    #[inline(always)]
-    fn search<S: Simd>(
-        &self,
-        simd: S,
-        x: [f32; 3],
-        not: Option<u32>,
-        support: f32,
-        list: &mut [u32],
-        r_sq: &mut [f32],
-    ) -> usize {
-        let [xi, yi, zi] = x.map(|c| f32x16::splat(simd, c));
-        let limit = f32x16::splat(simd, support * support);
-        let mut n = 0;
-        for at in (0..padded(self.len)).step_by(LANES) {
-            let d_x = f32x16::from_slice(simd, &self.x[at..at + LANES]) - xi;
-            let d_y = f32x16::from_slice(simd, &self.y[at..at + LANES]) - yi;
-            let d_z = f32x16::from_slice(simd, &self.z[at..at + LANES]) - zi;
-            let r = d_x * d_x + d_y * d_y + d_z * d_z;
-            let mut near = r.simd_lt(limit);
-            if let Some(own) = not {
-                let owner = u32x16::from_slice(simd, &self.owner[at..at + LANES]);
-                near &= !owner.simd_eq(u32x16::splat(simd, own));
-            }
-            let index = u32x16::from_slice(simd, &self.index[at..at + LANES]);
-            simd.compress_u32x16(index, near).store_slice(&mut list[n..n + LANES]);
-            simd.compress_f32x16(r, near).store_slice(&mut r_sq[n..n + LANES]);
-            n += simd.to_bitmask_mask32x16(near).count_ones() as usize;
-        }
-        n
+        count
     }
 }
 

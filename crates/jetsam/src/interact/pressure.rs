@@ -4,10 +4,11 @@
 
 use crate::laws::fluid;
 use crate::model::Model;
-use crate::scene::{EquationOfState, PressureForce};
+use crate::scene::{Density, EquationOfState, PressureForce};
 use crate::state::Record;
 
-/// Pressure (Pa) at relative density `d` of fluid `owner`.
+/// Pressure (Pa) at relative density `d` of fluid `owner`. Where densities are integrated it keeps its sign, for density
+/// diffusion; pairs cut it off.
 #[inline]
 pub fn pressure(model: &Model, owner: u32, d: f32) -> f32 {
     let stiffness = model.fluids[owner as usize].stiffness;
@@ -15,7 +16,7 @@ pub fn pressure(model: &Model, owner: u32, d: f32) -> f32 {
         EquationOfState::Linear => fluid::pressure_linear(d, stiffness),
         EquationOfState::Tait => fluid::pressure_tait(d, stiffness),
     };
-    if model.solver.negative_pressure { p } else { p.max(0.0) }
+    if model.solver.negative_pressure || model.solver.density == Density::Continuity { p } else { p.max(0.0) }
 }
 
 /// Pressure shares of a chunk of fluid particles.

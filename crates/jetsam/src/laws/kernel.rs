@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// One smoothing function.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Kernel {
     /// Cubic spline (Monaghan 1992), `H = 2 h`.
     Cubic,
@@ -65,6 +66,23 @@ impl KernelSet {
         }
     }
 }
+
+/// The same code for each kernel, `$k` a constant in it: the choice is made outside of loops, for inside it keeps the
+/// compiler from wide instructions.
+macro_rules! each_kernel {
+    ($kernel:expr, $k:ident => $body:expr) => {
+        each_kernel!($kernel, $k => $body; Cubic WendlandC2 WendlandC4 Quintic Poly6 Spiky Viscosity)
+    };
+    ($kernel:expr, $k:ident => $body:expr; $($name:ident)*) => {
+        match $kernel {
+            $($crate::laws::kernel::Kernel::$name => {
+                const $k: $crate::laws::kernel::Kernel = $crate::laws::kernel::Kernel::$name;
+                $body
+            })*
+        }
+    };
+}
+pub(crate) use each_kernel;
 
 impl Kernel {
     /// Every kernel there is.

@@ -59,3 +59,8 @@ law_file!(
     field,
     "src/laws/field.wgsl"
 );
+law_file!(
+    /// E22-E24, E26, E27, flocks (`laws/flock.wgsl`).
+    flock,
+    "src/laws/flock.wgsl"
+);

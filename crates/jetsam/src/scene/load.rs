@@ -32,14 +32,7 @@ impl Scene {
     /// A missing or unreadable file, a syntax error, an unknown key, a value of the wrong type or out of its
     /// range: each with line and remedy.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Self> {
-        let io = |source| Box::new(Error::Io { path: path.display().to_string(), source });
-        let size = std::fs::metadata(path).map_err(io)?.len();
-        if size > LARGEST_FILE {
-            return Err(io(std::io::Error::other(format!("{size} bytes are too many for a scene file"))));
-        }
-        let text = std::fs::read_to_string(path).map_err(io)?;
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        Self::parse(Source { name: path.display().to_string(), text, folder, builtin: false }, overrides)
+        Self::parse(Source::read(path)?, overrides)
     }
 
     /// Reads a scene from text. See [`Scene::load`].
@@ -124,6 +117,21 @@ impl Scene {
 }
 
 impl Source {
+    /// Reads the text of a scene file.
+    ///
+    /// # Errors
+    /// A file that is missing, unreadable or too large.
+    pub fn read(path: &Path) -> Result<Self> {
+        let io = |source| Box::new(Error::Io { path: path.display().to_string(), source });
+        let size = std::fs::metadata(path).map_err(io)?.len();
+        if size > LARGEST_FILE {
+            return Err(io(std::io::Error::other(format!("{size} bytes are too many for a scene file"))));
+        }
+        let text = std::fs::read_to_string(path).map_err(io)?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        Ok(Self { name: path.display().to_string(), text, folder, builtin: false })
+    }
+
     /// An error about the value at a dotted path.
     pub fn error(&self, path: &str, message: impl Into<String>, help: impl Into<String>) -> Box<Error> {
         let span = if path.is_empty() { None } else { self.locate(path) };

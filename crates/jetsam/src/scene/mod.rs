@@ -4,18 +4,28 @@
 //! remedy. Numbers have their unit, default and range in [`crate::params`]. Lengths are in metres, z points up.
 
 pub mod builtin;
+mod emitter;
+mod expect;
+mod flock;
 pub mod joint;
 mod load;
 pub mod motion;
+mod probe;
 pub mod solid;
 
+pub use crate::formula::Formula;
+pub use emitter::{Emitter, Outlet, Sink};
+pub use expect::{By, Compare, Expect, Take, Validation, Variant};
+pub use flock::{Flock, FlockModel, Relation};
 pub use load::{Source, schema};
+pub use probe::{Component, End, Line, Norm, Of, Probe, Space};
 
 use crate::laws::kernel::KernelSet;
 use crate::params::default as d;
 use glam::{DQuat, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A whole scene.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -52,9 +62,33 @@ pub struct Scene {
     /// Joints between bodies.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joint: Vec<joint::Joint>,
+    /// Sources of fluid.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub emitter: Vec<Emitter>,
+    /// Places where fluid vanishes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sink: Vec<Sink>,
+    /// Flocks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub flock: Vec<Flock>,
     /// Fields that pull on everything.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub force: Vec<Force>,
+    /// Named numbers, or formulas of each other, for use in formulas.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub constants: BTreeMap<String, Formula>,
+    /// What is measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub probe: Vec<Probe>,
+    /// What should come out: `jetsam validate` judges it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub expect: Vec<Expect>,
+    /// Runs with other values, in place of one run as the scene stands.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub variant: Vec<Variant>,
+    /// What kind of case the scene is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Validation>,
     /// The text this scene was read from, for error messages.
     #[serde(skip)]
     pub source: Source,
@@ -119,6 +153,12 @@ pub struct Solver {
     /// How pressure is found.
     #[serde(default)]
     pub pressure: Pressure,
+    /// How density is found (E1).
+    #[serde(default)]
+    pub density: Density,
+    /// `delta` of density diffusion (E1), where density is integrated. 0 turns it off.
+    #[serde(default = "d::density_diffusion")]
+    pub density_diffusion: f64,
     /// Equation of state (E3).
     #[serde(default)]
     pub equation_of_state: EquationOfState,
@@ -149,6 +189,20 @@ pub struct Solver {
     /// Values of all choices at once; what is written besides wins.
     #[serde(default)]
     pub preset: Preset,
+    /// Shifting (Sun et al. 2017), as a multiple of theirs: inside a fluid, particles are carried from where they are
+    /// dense to where they are sparse. 0 turns it off.
+    #[serde(default = "d::shifting")]
+    pub shifting: f64,
+    /// Part of the surface tension that the curvature term carries, the rest is cohesion's (E7). Cohesion alone lets drops freeze
+    /// before they are round; the curvature term alone does not hold threads together.
+    #[serde(default = "d::curvature")]
+    pub curvature: f64,
+    /// Vorticity confinement (E8): gives back swirl that is lost to viscosity between particles. 0 turns it off.
+    #[serde(default = "d::vorticity")]
+    pub vorticity: f64,
+    /// Whether fluids slip along walls and bodies as if they had no viscosity there.
+    #[serde(default)]
+    pub walls_slip: bool,
     /// What acts between fluid and rigid bodies.
     #[serde(default)]
     pub coupling: Coupling,
@@ -200,6 +254,18 @@ pub enum Pressure {
     /// Weakly compressible SPH: pressure from density by an equation of state.
     #[default]
     Wcsph,
+}
+
+/// E1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Density {
+    /// Summed anew each step over the neighbours: cannot drift; a free surface looks thin to it.
+    #[default]
+    Summation,
+    /// Integrated from the divergence of the flow, with density diffusion (delta-SPH; Antuono et al. 2012): smooth
+    /// pressures, for gauges and waves.
+    Continuity,
 }
 
 /// E3.
@@ -332,20 +398,37 @@ pub struct Fluid {
     /// Name; `fluid` when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Where it stands at the beginning.
-    pub shape: Shape,
+    /// Where it stands at the beginning; absent for a fluid that only comes from emitters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Shape>,
     /// Rest density `rho_0`.
     #[serde(default = "d::fluid_density")]
     pub density: f64,
     /// Dynamic viscosity `mu`.
     #[serde(default = "d::fluid_viscosity")]
     pub viscosity: f64,
-    /// Velocity at the beginning.
-    #[serde(default)]
-    pub velocity: [f64; 3],
+    /// Surface tension against the air (E7). 0 turns it off.
+    #[serde(default = "d::fluid_surface_tension")]
+    pub surface_tension: f64,
+    /// Velocity at the beginning: three numbers, or formulas of x, y, z (m).
+    #[serde(default = "at_rest")]
+    pub velocity: [Formula; 3],
     /// How the particles stand at the beginning.
     #[serde(default)]
     pub start: Start,
+    /// How far each particle is moved at random from there, at most, along each axis.
+    #[serde(default = "d::jitter")]
+    pub jitter: f64,
+    /// How far particles are moved from there (m): three formulas of x, y, z, as for the surface of a standing wave.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displace: Option<[Formula; 3]>,
+    /// How long a particle lives; for ever when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lifetime: Option<f64>,
+}
+
+fn at_rest() -> [Formula; 3] {
+    [0.0; 3].map(Formula::Number)
 }
 
 /// How a fluid's particles stand at the beginning.
@@ -493,6 +576,17 @@ pub enum Shape {
         radius: f64,
         /// Length of the axis (m).
         height: f64,
+    },
+    /// A ring: the torus about `center` whose tube of radius `tube` runs at distance `radius` from the axis. 3D scenes only.
+    Torus {
+        /// Centre (m).
+        center: [f64; 3],
+        /// Direction of the axis.
+        axis: [f64; 3],
+        /// Radius of the ring (m).
+        radius: f64,
+        /// Radius of the tube (m).
+        tube: f64,
     },
     /// A triangle mesh: OBJ, STL, PLY, glTF or GLB. 3D scenes only.
     Mesh {

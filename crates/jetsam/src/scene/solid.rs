@@ -135,6 +135,28 @@ impl Scene {
                 });
                 Ok(Solid { points, volume, center, inertia, mesh: None, warnings: vec![] })
             }
+            Shape::Torus { center, axis, radius, tube } => {
+                let (axis, center) = (DVec3::from(*axis), DVec3::from(*center));
+                positive("length of the axis", axis.length())?;
+                positive("tube", *tube)?;
+                positive("radius - tube", radius - tube)?;
+                if flat {
+                    let message = format!("`{key}`: a torus needs a 3D scene");
+                    return Err(self.error(key, message, "set [world] dimensions = 3, or use a sphere"));
+                }
+                let (axis, big, small) = (axis.normalize(), *radius, *tube);
+                let volume = 2.0 * PI * PI * big * small * small;
+                fits(volume)?;
+                let along = volume * (big * big + 0.75 * small * small);
+                let across = volume * (0.5 * big * big + 0.625 * small * small);
+                let outer = DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
+                let inertia = DMat3::IDENTITY * across + outer * (along - across);
+                let points = lattice(center, DVec3::splat(big + small), dx, false, |p| {
+                    let z = p.dot(axis);
+                    ((p - axis * z).length() - big).hypot(z) < small
+                });
+                Ok(Solid { points, volume, center, inertia, mesh: None, warnings: vec![] })
+            }
             Shape::Mesh { path, scale } => self.mesh_solid(path, *scale, key),
             Shape::Difference { from, cut } => self.difference(from, cut, key),
             Shape::Points(points) => {
@@ -167,7 +189,7 @@ impl Scene {
         let whole = self.solid(from, &format!("{key}.difference.from"))?;
         for (index, shape) in cut.iter().enumerate() {
             if !shape.is_plain() {
-                let message = format!("`{key}`: a mesh or points cannot be cut out");
+                let message = format!("`{key}`: a torus, a mesh or points cannot be cut out");
                 return Err(self.error(
                     &format!("{key}.difference.cut.{index}"),
                     message,
@@ -239,7 +261,7 @@ impl Shape {
         match self {
             Shape::Box(_) | Shape::Sphere { .. } | Shape::Cylinder { .. } => true,
             Shape::Difference { from, cut } => from.is_plain() && cut.iter().all(Shape::is_plain),
-            Shape::Mesh { .. } | Shape::Points(_) => false,
+            Shape::Torus { .. } | Shape::Mesh { .. } | Shape::Points(_) => false,
         }
     }
 
@@ -259,7 +281,7 @@ impl Shape {
                 (flat || along.abs() < 0.5 * height) && (d - axis * along).length() < *radius
             }
             Shape::Difference { from, cut } => from.contains(p, flat) && !cut.iter().any(|c| c.contains(p, flat)),
-            Shape::Mesh { .. } | Shape::Points(_) => false,
+            Shape::Torus { .. } | Shape::Mesh { .. } | Shape::Points(_) => false,
         }
     }
 }

@@ -1,0 +1,99 @@
+//! Agents move: steering and forces become velocity, velocity becomes place; sides of the domain and bodies hold.
+//!
+//! Reynolds' agents are kicked first and carried by the new velocity; Couzin's take the decided velocity at once; Vicsek's keep the old
+//! one until the next decision, as their law has it.
+
+use super::model::FlockConstants;
+use super::obstacles;
+use super::stage::World;
+use crate::interact::cells::Grid;
+use crate::laws::flock;
+use crate::scene::{FlockModel, Wall};
+use crate::state::Record;
+use glam::Vec3;
+
+/// Cosine and sine of an angle that a turn may reach; none is too large from half a turn on.
+pub fn turn(angle: f64) -> (f32, f32) {
+    if angle >= std::f64::consts::PI { (-2.0, 0.0) } else { (angle.cos() as f32, angle.sin() as f32) }
+}
+
+/// Moves a chunk of agents of one flock by `dt` (s).
+pub fn chunk(
+    world: &World,
+    rule: &FlockConstants,
+    dt: f64,
+    records: &mut [Record],
+    next: &mut [[f32; 3]],
+    force: &[[f32; 3]],
+) {
+    let turn = turn(rule.limits.turn * dt);
+    let obstacles = world.has_bodies();
+    for ((r, next), force) in records.iter_mut().zip(next).zip(force) {
+        match rule.model {
+            FlockModel::Reynolds => r.v = kicked(rule, r, *next, *force, dt as f32, turn),
+            FlockModel::Couzin => r.v = *next,
+            FlockModel::Vicsek => {}
+        }
+        let before = r.x;
+        for a in 0..3 {
+            r.x[a] += dt as f32 * r.v[a];
+        }
+        let sides = inside(&world.model.grid, rule.size, &mut r.x);
+        for a in 0..3 {
+            bounce(&mut r.v[a], sides[a]);
+            if rule.model != FlockModel::Reynolds {
+                bounce(&mut next[a], sides[a]);
+            }
+        }
+        if obstacles && let Some(normal) = obstacles::hold(world, rule, before, &mut r.x) {
+            mirror(&mut r.v, normal);
+            if rule.model != FlockModel::Reynolds {
+                mirror(next, normal);
+            }
+        }
+        world.model.grid.wrap(&mut r.x);
+    }
+}
+
+/// Velocity after a step of Reynolds' agents.
+fn kicked(
+    rule: &FlockConstants,
+    r: &Record,
+    steering: [f32; 3],
+    force: [f32; 3],
+    dt: f32,
+    turn: (f32, f32),
+) -> [f32; 3] {
+    let inverse_mass = if rule.mass > 0.0 { 1.0 / rule.mass } else { 0.0 };
+    let a: [f32; 3] = std::array::from_fn(|c| steering[c] + force[c] * inverse_mass);
+    let heading = Vec3::from(r.v).normalize_or_zero().to_array();
+    let v = flock::moved(r.v, a, dt, heading, turn.0, turn.1, rule.limits.slowest, rule.limits.fastest);
+    [v.x, v.y, v.z]
+}
+
+/// Brings a place inside the solid sides, as far as the agent's size asks; says on which axis it had passed which.
+pub fn inside(grid: &Grid, size: f32, x: &mut [f32; 3]) -> [f32; 3] {
+    let mut sides = [0.0; 3];
+    for a in (0..3).filter(|&a| grid.walls[a] == Wall::Solid) {
+        let (low, high) = (grid.min[a] as f32 + size, grid.max[a] as f32 - size);
+        if x[a] < low {
+            (x[a], sides[a]) = ((2.0 * low - x[a]).min(high), 1.0);
+        } else if x[a] > high {
+            (x[a], sides[a]) = ((2.0 * high - x[a]).max(low), -1.0);
+        }
+    }
+    sides
+}
+
+/// A velocity component turned inward where a side was passed.
+fn bounce(v: &mut f32, side: f32) {
+    if side != 0.0 {
+        *v = side * v.abs();
+    }
+}
+
+/// A velocity mirrored by what it runs into.
+fn mirror(v: &mut [f32; 3], normal: Vec3) {
+    let u = Vec3::from(*v);
+    *v = (u - 2.0 * u.dot(normal).min(0.0) * normal).to_array();
+}

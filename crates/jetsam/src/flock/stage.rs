@@ -1,0 +1,204 @@
+//! The stage `agents`: agents move, are sorted, decide, and exert forces.
+
+use super::decide::{self, View, with_scratch};
+use super::model::FlockConstants;
+use super::motion;
+use super::perception::{Sorted, grid_about};
+use crate::integrate::Advance;
+use crate::interact::CHUNK;
+use crate::interact::cells::{Cells, Grid};
+use crate::model::Model;
+use crate::state::{Agents, Body, Kind, Particles, Record};
+use fearless_simd::{Level, dispatch};
+use glam::Vec3;
+use rayon::prelude::*;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// What is around the agents.
+#[derive(Clone, Copy)]
+pub struct World<'a> {
+    /// Constants.
+    pub model: &'a Model,
+    /// Fluids and bodies, sorted.
+    pub particles: &'a Particles,
+    /// Their cells.
+    pub cells: [&'a Cells; Kind::COUNT],
+    /// Bodies.
+    pub bodies: &'a [Body],
+    /// Radius of each body about its centre of mass (m).
+    pub radius: &'a [f32],
+}
+
+impl<'a> World<'a> {
+    /// Whether there is anything to run into.
+    pub fn has_bodies(&self) -> bool {
+        self.particles.count[Kind::Rigid as usize] + self.particles.count[Kind::Static as usize] > 0
+    }
+
+    /// Bodies that move, with their radii (m).
+    pub fn rigid(&self) -> impl Iterator<Item = (&'a Body, f32)> {
+        self.bodies.iter().zip(self.radius.iter().copied()).filter(|(b, _)| !b.is_static())
+    }
+
+    /// From one place to another by the shortest way on periodic axes (m).
+    pub fn apart(&self, from: [f32; 3], to: [f32; 3]) -> Vec3 {
+        let mut d = Vec3::from(to) - Vec3::from(from);
+        for (a, &period) in self.model.grid.period.iter().enumerate() {
+            if period > 0.0 {
+                d[a] -= period * (d[a] / period).round();
+            }
+        }
+        d
+    }
+}
+
+/// Scratch of the stage; the agents themselves are in the state.
+#[derive(Default)]
+pub struct Crowd {
+    cells: Vec<Cells>,
+    inside: Vec<usize>,
+    grid: Option<Grid>,
+    sorted: Sorted,
+    record: Vec<Record>,
+    id: Vec<u32>,
+    next: Vec<[f32; 3]>,
+    /// Agents whose position was not finite, at the last sort.
+    pub nonfinite: usize,
+}
+
+/// A decision that is due in less than this fraction of `tau` is due now.
+const SOON: f64 = 1e-6;
+
+impl Crowd {
+    /// The stage, but for the forces agents exert. A step of length 0 decides only, as a run begins with it.
+    pub fn run(&mut self, level: Level, world: &World, agents: &mut Agents, advance: Advance) {
+        let flocks = &world.model.flocks;
+        if flocks.is_empty() || advance.drag > 0.0 {
+            return;
+        }
+        if advance.dt > 0.0 {
+            travel(world, agents, advance.dt);
+        }
+        let due: Vec<bool> = flocks.iter().zip(&agents.clock).map(|(f, c)| c.wait <= SOON * f.tau).collect();
+        if due.contains(&true) {
+            take_over(flocks, &due, agents);
+            self.sort(world, agents);
+            self.decide(level, world, agents, &due);
+        }
+    }
+
+    /// Sorts every flock.
+    fn sort(&mut self, world: &World, agents: &mut Agents) {
+        let model = world.model;
+        let grid = grid_about(&model.grid, &agents.record, model.dimensions, self.width(model, agents));
+        self.cells.resize_with(model.flocks.len(), Cells::default);
+        self.inside.clear();
+        self.nonfinite = 0;
+        let n = agents.record.len();
+        self.record.resize(n, Record::default());
+        self.id.resize(n, 0);
+        self.next.resize(n, [0.0; 3]);
+        for (flock, cells) in model.flocks.iter().zip(&mut self.cells) {
+            let range = flock.range();
+            let from = (&agents.record[range.clone()], &agents.id[range.clone()], &agents.next[range.clone()]);
+            self.inside.push(cells.sort(&grid, from.0, Some(from.1)));
+            self.nonfinite += cells.nonfinite;
+            let to = self.record[range.clone()].par_chunks_mut(CHUNK);
+            let to = to.zip(self.id[range.clone()].par_chunks_mut(CHUNK)).zip(self.next[range].par_chunks_mut(CHUNK));
+            to.zip(cells.order[..flock.count].par_chunks(CHUNK)).for_each(|(((record, id), next), order)| {
+                for (k, at) in order.iter().enumerate() {
+                    let at = at.load(Relaxed) as usize;
+                    record[k] = from.0[at];
+                    id[k] = from.1[at];
+                    next[k] = from.2[at];
+                }
+            });
+        }
+        std::mem::swap(&mut self.record, &mut agents.record);
+        std::mem::swap(&mut self.id, &mut agents.id);
+        std::mem::swap(&mut self.next, &mut agents.next);
+        self.sorted.fill(&agents.record);
+        self.grid = Some(grid);
+    }
+
+    /// Decides for the flocks that are due.
+    fn decide(&mut self, level: Level, world: &World, agents: &mut Agents, due: &[bool]) {
+        let flocks = &world.model.flocks;
+        let leaders: Vec<Record> = flocks.iter().map(|f| first(f, agents)).collect();
+        let Some(grid) = &self.grid else { return };
+        let view = View {
+            world,
+            grid,
+            cells: &self.cells,
+            sorted: &self.sorted,
+            records: &agents.record,
+            id: &agents.id,
+            leaders: &leaders,
+            clock: &agents.clock,
+        };
+        for (own, flock) in flocks.iter().enumerate().filter(|(own, _)| due[*own]) {
+            let inside = flock.first..flock.first + self.inside[own];
+            agents.next[inside.clone()].par_chunks_mut(CHUNK).enumerate().for_each(|(c, next)| {
+                let begin = inside.start + c * CHUNK;
+                let members = begin..begin + next.len();
+                with_scratch(|scratch| {
+                    dispatch!(level, simd => decide::chunk(simd, scratch, view, own, members, next));
+                });
+            });
+        }
+    }
+
+    /// Width of the cells (m): as far as anyone perceives; for topological neighbours, so that some cells hold about as many.
+    fn width(&self, model: &Model, agents: &Agents) -> f64 {
+        let reach = model.flocks.iter().map(|f| f64::from(f.reach())).fold(0.0, f64::max);
+        let mut width = 1.0001 * reach;
+        if width == 0.0 {
+            let mut extent = [f32::INFINITY, f32::NEG_INFINITY];
+            for r in &agents.record {
+                for a in 0..3 {
+                    extent = [extent[0].min(r.x[a]), extent[1].max(r.x[a])];
+                }
+            }
+            let per_axis = (agents.record.len() as f64 / 2.0).powf(1.0 / f64::from(model.dimensions)).max(1.0);
+            width = f64::from(extent[1] - extent[0]) / per_axis;
+        }
+        if width.is_finite() && width > 0.0 { width } else { 1.0 }
+    }
+}
+
+/// Moves all agents.
+fn travel(world: &World, agents: &mut Agents, dt: f64) {
+    for (flock, clock) in world.model.flocks.iter().zip(&mut agents.clock) {
+        let range = flock.range();
+        agents.record[range.clone()]
+            .par_chunks_mut(CHUNK)
+            .zip(agents.next[range.clone()].par_chunks_mut(CHUNK))
+            .zip(agents.force[range].par_chunks(CHUNK))
+            .for_each(|((records, next), force)| motion::chunk(world, flock, dt, records, next, force));
+        clock.time += dt;
+        clock.wait -= dt;
+    }
+}
+
+/// The clocks of flocks that are due go on, and Vicsek's agents take over what they decided last (E24).
+fn take_over(flocks: &[FlockConstants], due: &[bool], agents: &mut Agents) {
+    for (own, flock) in flocks.iter().enumerate().filter(|(own, _)| due[*own]) {
+        let clock = &mut agents.clock[own];
+        let begun = clock.decisions > 0;
+        clock.decisions += 1;
+        clock.wait = flock.tau;
+        if begun && flock.model == crate::scene::FlockModel::Vicsek {
+            let range = flock.range();
+            for (r, next) in agents.record[range.clone()].iter_mut().zip(&agents.next[range]) {
+                r.v = *next;
+            }
+        }
+    }
+}
+
+/// The agent of a flock with the lowest id.
+fn first(flock: &FlockConstants, agents: &Agents) -> Record {
+    let range = flock.range();
+    let at = agents.id[range.clone()].iter().position(|&id| id as usize == flock.first);
+    agents.record[range.start + at.unwrap_or(0)]
+}

@@ -1,0 +1,220 @@
+//! What an agent perceives: sums over its neighbours, sixteen at a time.
+//!
+//! In: an agent and a tile of candidates. Out: [`Sums`]. The laws are those of `laws/flock.wgsl`; the order of additions is fixed.
+
+use super::model::FlockConstants;
+use super::perception::Tile;
+use crate::interact::lanes::{LANES, Lanes, sum};
+use crate::laws::flock;
+use crate::scene::FlockModel;
+use crate::state::Record;
+use fearless_simd::f32x16;
+use fearless_simd::prelude::*;
+use glam::Vec3;
+
+/// Sums over neighbours.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sums {
+    /// Away from those too near: pushes (Reynolds), unit vectors (Couzin).
+    pub repelled: Vec3,
+    /// Velocities (m/s) of those aligned with, and their number.
+    pub velocity: Vec3,
+    /// Number of those aligned with.
+    pub aligned: f32,
+    /// Relative places (m) of those drawn to (Couzin: unit vectors), and their number.
+    pub place: Vec3,
+    /// Number of those drawn to.
+    pub drawn: f32,
+    /// `d / r^2` (1/m) of those fled.
+    pub fled: Vec3,
+    /// `d / r^2` (1/m) of those chased.
+    pub chased: Vec3,
+}
+
+/// The same, lane by lane.
+struct Wide {
+    repelled: [Lanes; 3],
+    velocity: [Lanes; 3],
+    aligned: Lanes,
+    place: [Lanes; 3],
+    drawn: Lanes,
+}
+
+impl Wide {
+    #[inline(always)]
+    fn new() -> Self {
+        let zero = [[0.0; LANES]; 3];
+        Self { repelled: zero, velocity: zero, aligned: [0.0; LANES], place: zero, drawn: [0.0; LANES] }
+    }
+}
+
+#[inline(always)]
+fn fold<S: Simd>(simd: S, wide: &[Lanes; 3]) -> Vec3 {
+    Vec3::new(sum(simd, &wide[0]), sum(simd, &wide[1]), sum(simd, &wide[2]))
+}
+
+/// `d` and its square for sixteen candidates.
+#[inline(always)]
+fn apart(me: &Record, block: &[&[f32; LANES]; 6]) -> ([Lanes; 3], Lanes) {
+    let (mut d, mut r_sq) = ([[0.0; LANES]; 3], [0.0; LANES]);
+    for l in 0..LANES {
+        d[0][l] = block[0][l] - me.x[0];
+        d[1][l] = block[1][l] - me.x[1];
+        d[2][l] = block[2][l] - me.x[2];
+        r_sq[l] = d[0][l] * d[0][l] + d[1][l] * d[1][l] + d[2][l] * d[2][l];
+    }
+    (d, r_sq)
+}
+
+/// Who of sixteen is in view.
+#[inline(always)]
+fn in_view(me: &Record, d: &[Lanes; 3], r_sq: &Lanes, bound: f32) -> Lanes {
+    let v = me.v;
+    let speed_sq = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    let mut seen = [0.0; LANES];
+    for l in 0..LANES {
+        seen[l] = flock::in_view(d[0][l] * v[0] + d[1][l] * v[1] + d[2][l] * v[2], r_sq[l], speed_sq, bound);
+    }
+    seen
+}
+
+/// Adds `weight` times a vector, lane by lane.
+#[inline(always)]
+fn add(to: &mut [Lanes; 3], weight: &Lanes, vector: [&Lanes; 3]) {
+    for a in 0..3 {
+        for l in 0..LANES {
+            to[a][l] += weight[l] * vector[a][l];
+        }
+    }
+}
+
+/// Sums over those an agent schools with. `unbounded`: the tile holds topological neighbours, whatever their distance.
+#[inline(always)]
+pub fn school<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, sums: &mut Sums) {
+    let mut wide = Wide::new();
+    match rule.model {
+        FlockModel::Reynolds => reynolds(simd, me, rule, tile, unbounded, &mut wide),
+        FlockModel::Couzin => couzin(me, rule, tile, unbounded, &mut wide),
+        FlockModel::Vicsek => vicsek(me, rule, tile, unbounded, &mut wide),
+    }
+    sums.repelled += fold(simd, &wide.repelled);
+    sums.velocity += fold(simd, &wide.velocity);
+    sums.aligned += sum(simd, &wide.aligned);
+    sums.place += fold(simd, &wide.place);
+    sums.drawn += sum(simd, &wide.drawn);
+}
+
+/// Square of a radius; of topological neighbours none is too far.
+#[inline(always)]
+fn square(radius: f32, unbounded: bool) -> f32 {
+    if unbounded { 1e30 } else { radius * radius }
+}
+
+/// E22.
+#[inline(always)]
+fn reynolds<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+    let near_sq = rule.separation_radius * rule.separation_radius;
+    let (near_limit, zero) = (f32x16::splat(simd, near_sq), f32x16::splat(simd, 0.0));
+    let align_sq = square(rule.alignment_radius, unbounded);
+    let draw_sq = square(rule.cohesion_radius, unbounded);
+    for b in 0..tile.blocks() {
+        let block = tile.block(b);
+        let (d, r_sq) = apart(me, &block);
+        let (mut aligned, mut drawn) = ([0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            aligned[l] = flock::within(r_sq[l], align_sq);
+            drawn[l] = flock::within(r_sq[l], draw_sq);
+        }
+        let mut seen = [1.0; LANES];
+        if let Some(bound) = rule.view {
+            seen = in_view(me, &d, &r_sq, bound);
+            for l in 0..LANES {
+                aligned[l] *= seen[l];
+                drawn[l] *= seen[l];
+            }
+        }
+        add(&mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
+        add(&mut wide.place, &drawn, [&d[0], &d[1], &d[2]]);
+        for l in 0..LANES {
+            wide.aligned[l] += aligned[l];
+            wide.drawn[l] += drawn[l];
+        }
+        // few are near: most vectors are spared the division
+        let wide_r = f32x16::load_array_ref(simd, &r_sq);
+        if (wide_r.simd_lt(near_limit) & wide_r.simd_gt(zero)).any_true() {
+            let mut push = [0.0; LANES];
+            for l in 0..LANES {
+                let weight = flock::separation(r_sq[l], rule.separation_radius) * flock::within(r_sq[l], near_sq);
+                push[l] = -seen[l] * weight;
+            }
+            add(&mut wide.repelled, &push, [&d[0], &d[1], &d[2]]);
+        }
+    }
+}
+
+/// E23. Speeds are equal: velocities stand for directions.
+#[inline(always)]
+fn couzin(me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+    let near_sq = rule.separation_radius * rule.separation_radius;
+    let align_sq = square(rule.alignment_radius, false).max(near_sq);
+    let draw_sq = square(rule.cohesion_radius, unbounded).max(align_sq);
+    for b in 0..tile.blocks() {
+        let block = tile.block(b);
+        let (d, r_sq) = apart(me, &block);
+        let seen = match rule.view {
+            Some(bound) => in_view(me, &d, &r_sq, bound),
+            None => [1.0; LANES],
+        };
+        let (mut repelled, mut aligned, mut drawn) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            let inverse = 1.0 / r_sq[l].max(1e-30).sqrt();
+            repelled[l] = -inverse * flock::within(r_sq[l], near_sq);
+            aligned[l] = seen[l] * flock::between(r_sq[l], near_sq, align_sq) / rule.limits.speed;
+            drawn[l] = inverse * seen[l] * flock::between(r_sq[l], align_sq, draw_sq);
+        }
+        add(&mut wide.repelled, &repelled, [&d[0], &d[1], &d[2]]);
+        add(&mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
+        add(&mut wide.place, &drawn, [&d[0], &d[1], &d[2]]);
+    }
+}
+
+/// E24.
+#[inline(always)]
+fn vicsek(me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+    let align_sq = square(rule.alignment_radius, unbounded);
+    for b in 0..tile.blocks() {
+        let block = tile.block(b);
+        let (d, r_sq) = apart(me, &block);
+        let mut aligned = [0.0; LANES];
+        for l in 0..LANES {
+            aligned[l] = flock::within(r_sq[l], align_sq);
+        }
+        if let Some(bound) = rule.view {
+            let seen = in_view(me, &d, &r_sq, bound);
+            for l in 0..LANES {
+                aligned[l] *= seen[l];
+            }
+        }
+        add(&mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
+    }
+}
+
+/// E26: sum of `d / r^2` over those in sight.
+#[inline(always)]
+pub fn seen<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile) -> Vec3 {
+    let mut total = [[0.0; LANES]; 3];
+    let sight_sq = rule.sight * rule.sight;
+    for b in 0..tile.blocks() {
+        let block = tile.block(b);
+        let (d, r_sq) = apart(me, &block);
+        let mut weight = match rule.view {
+            Some(bound) => in_view(me, &d, &r_sq, bound),
+            None => [1.0; LANES],
+        };
+        for l in 0..LANES {
+            weight[l] *= flock::within(r_sq[l], sight_sq) * flock::nearness(r_sq[l]);
+        }
+        add(&mut total, &weight, [&d[0], &d[1], &d[2]]);
+    }
+    fold(simd, &total)
+}
