@@ -111,7 +111,9 @@ fn margins(model: &Model, dt: f64, acceleration: f64) -> Vec<Margin> {
         add("viscous", dt * viscosity / (h * h), s.courant_viscous, "dt nu / h^2");
         add("mach", model.largest_speed / model.sound_speed, 0.1, "v / c_0; above it density errors exceed 1 %");
     }
-    let shortest = (0..model.contacts.len()).map(|b| model.contact_time(b)).fold(f64::INFINITY, f64::min);
+    let shortest = (0..model.contacts.len())
+        .map(|b| model.contact_time(b, model.contacts[b].shared_by))
+        .fold(f64::INFINITY, f64::min);
     if shortest.is_finite() {
         add("contact", PI * dt / shortest, 2.0, "omega dt");
     }

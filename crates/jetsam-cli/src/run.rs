@@ -103,6 +103,7 @@ fn describe(s: &Summary, folder: &Path) -> String {
             format!("mean {:.2} %, max {:.2} %", 100.0 * s.density_error_mean, 100.0 * s.density_error_max),
         ),
         ("lost particles", format!("{}{left}", s.lost)),
+        ("fast contacts", s.fast_contacts.to_string()),
         ("momentum residual", format!("{:.1e}", s.momentum_residual)),
         ("state hash", s.state_hash.clone()),
         ("output", folder.display().to_string()),

@@ -7,6 +7,8 @@ use glam::DVec3;
 pub struct Ledger {
     /// Largest speed of any particle (m/s).
     pub speed: f64,
+    /// Largest speed of any particle of a rigid body (m/s).
+    pub body_speed: f64,
     /// Largest acceleration of any fluid particle (m/s^2).
     pub acceleration: f64,
     /// Momentum of fluids and rigid bodies (kg m/s).
@@ -17,6 +19,8 @@ pub struct Ledger {
     pub crossed: DVec3,
     /// Force from outside: walls, static bodies, gravity, fields (N).
     pub external_force: DVec3,
+    /// Impulse of this step by joints to what does not move (N s).
+    pub external_impulse: DVec3,
     /// Sum of all forces on fluids and rigid bodies (N): equals `external_force` up to rounding (E12, C9).
     pub total_force: DVec3,
     /// Sum of the magnitudes of the forces on fluids' and bodies' particles (N).
@@ -43,6 +47,9 @@ pub struct Ledger {
     pub lost: u64,
     /// Particles of rigid bodies that are now beyond a solid wall.
     pub rigid_lost: usize,
+    /// Times a body came so deep into another, or moved so far in a step while touching one, that it could have passed
+    /// through, since the beginning (E12).
+    pub fast_contacts: u64,
     /// Particles found with a position that is not finite, since the beginning.
     pub nonfinite: u64,
 }

@@ -4,6 +4,8 @@ use crate::flock::FlockConstants;
 use crate::integrate::sources::{Drain, Source};
 use crate::interact::cells::Grid;
 use crate::laws::kernel::{Kernel, KernelSet};
+use crate::scene::joint::JointModel;
+use crate::scene::motion::{Path, Shake};
 use crate::scene::{Density, Force, Solver, Viscosity};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -43,6 +45,12 @@ pub struct Model {
     pub seed: u64,
     /// Fields besides gravity (E30).
     pub fields: Vec<Force>,
+    /// Shaking of the scene, felt with gravity.
+    pub shakes: Vec<Shake>,
+    /// Joints of bodies, in the order of the scene.
+    pub joints: Vec<JointModel>,
+    /// Script of each body that has one (E15).
+    pub paths: Vec<Option<Path>>,
     /// The box particles live in and its cells.
     pub grid: Grid,
     /// Contact diameter `r` (m).
@@ -169,6 +177,14 @@ pub struct ContactModel {
     pub ln_restitution: f32,
     /// Number of simultaneous contacts for which stiffness and damping are shared out.
     pub shared_by: f32,
+    /// Most particles in one layer: as many contacts share a load at most.
+    pub face: f32,
+    /// Friction, or negative where the other body's counts (E13).
+    pub friction: f32,
+    /// Whether a joint holds it.
+    pub jointed: bool,
+    /// Bodies it does not touch, for a joint holds them together.
+    pub joined: Vec<u32>,
     /// Stated spring constant (N/m), or 0.
     pub stiffness: f32,
     /// Stated dashpot (N s/m), or negative.
@@ -187,6 +203,8 @@ pub enum DtBound {
     Viscosity,
     /// A twentieth of a contact.
     Contact,
+    /// The fastest body moves a tenth of the contact diameter.
+    Travel,
     /// A quarter of the smallest radius of a flock, or its next decision.
     Flock,
     /// The scene's own `dt`.
@@ -203,12 +221,18 @@ impl DtBound {
             DtBound::Force => "force",
             DtBound::Viscosity => "viscosity",
             DtBound::Contact => "contact",
+            DtBound::Travel => "travel",
             DtBound::Flock => "flock",
             DtBound::Scene => "scene",
             DtBound::Frame => "frame",
         }
     }
 }
+
+/// Tangential over normal spring of a contact: both then last equally long for a ball (Schaefer, Dippel and Wolf 1996).
+const TANGENTIAL: f32 = 2.0 / 7.0;
+/// Damping ratio of the tangential spring (E13).
+const TANGENTIAL_DAMPING: f32 = 0.3;
 
 impl Model {
     /// Whether the pairs of fluids have no laws but pressure and viscosity (E4, E5 without Mueller's form).
@@ -232,6 +256,55 @@ impl Model {
         (0.01 * 0.25 * self.support * self.support) as f32
     }
 
+    /// Gravity at a time (s), with what shaking adds (m/s^2).
+    pub fn gravity_at(&self, time: f64) -> DVec3 {
+        self.shakes.iter().fold(self.gravity, |g, shake| g + shake.felt(time))
+    }
+
+    /// Whether forces move a body.
+    #[inline]
+    pub fn moves(&self, body: u32) -> bool {
+        self.contacts[body as usize].inverse_mass > 0.0
+    }
+
+    /// Whether two bodies pass through each other: none of them moves by forces, or a joint holds them together.
+    #[inline]
+    pub fn apart(&self, a: u32, b: u32) -> bool {
+        !(self.moves(a) || self.moves(b)) || self.contacts[a as usize].joined.contains(&b)
+    }
+
+    /// Reduced mass of bodies `a` and `b` (kg).
+    #[inline]
+    pub fn reduced_mass(&self, a: u32, b: u32) -> f32 {
+        1.0 / (self.contacts[a as usize].inverse_mass + self.contacts[b as usize].inverse_mass)
+    }
+
+    /// Dashpot (N s/m) that takes the speed of approach of bodies `a` and `b` within a step if as many contacts as a
+    /// face has particles share it, and never more (E12).
+    #[inline]
+    pub fn stop(&self, a: u32, b: u32, dt: f32) -> f32 {
+        let mass = self.reduced_mass(a, b);
+        let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
+        if dt > 0.0 { mass / (dt * a.face.max(b.face)) } else { 0.0 }
+    }
+
+    /// Tangential spring (N/m), its dashpot (N s/m) and friction of one contact of bodies `a` and `b` with the normal
+    /// spring `k` times `part`, while `counted` contacts share the load (E13). Symmetric to the last bit.
+    #[inline]
+    pub fn friction_pair(&self, a: u32, b: u32, k: f32, part: f32, counted: f32) -> (f32, f32, f32) {
+        let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
+        let mu = match (a.friction < 0.0, b.friction < 0.0) {
+            (true, _) => b.friction,
+            (_, true) => a.friction,
+            _ => (a.friction * b.friction).sqrt(),
+        };
+        let mass = 1.0 / (a.inverse_mass + b.inverse_mass);
+        let n = a.shared_by.max(b.shared_by).max(counted);
+        let k_t = TANGENTIAL * k;
+        let eta_t = part * crate::laws::contact::dashpot(TANGENTIAL_DAMPING, k_t / part * n, mass) / n;
+        (k_t, eta_t, mu)
+    }
+
     /// Whether colour gradients or vorticities are wanted (E7, E8).
     pub fn wants_gradients(&self) -> bool {
         self.fluids.iter().any(|f| f.curvature > 0.0) || self.solver.vorticity > 0.0
@@ -246,6 +319,12 @@ impl Model {
     /// Symmetric to the last bit.
     #[inline]
     pub fn contact_pair(&self, a: u32, b: u32) -> (f32, f32) {
+        self.contact_pair_of(a, b, 1.0)
+    }
+
+    /// The same while `counted` contacts share the load: the dashpot's part is the smaller.
+    #[inline]
+    pub fn contact_pair_of(&self, a: u32, b: u32, counted: f32) -> (f32, f32) {
         let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
         let reduced_mass = 1.0 / (a.inverse_mass + b.inverse_mass);
         self.contact_constants(
@@ -256,6 +335,7 @@ impl Model {
                 _ => 0.5 * (a.ln_restitution + b.ln_restitution),
             },
             a.shared_by.max(b.shared_by),
+            counted,
             a.stiffness.max(b.stiffness),
             a.damping.max(b.damping),
         )
@@ -266,11 +346,19 @@ impl Model {
     pub fn coupling_pair(&self, fluid: u32, b: u32) -> (f32, f32) {
         let b = &self.contacts[b as usize];
         let reduced_mass = 1.0 / (1.0 / self.fluids[fluid as usize].mass + b.inverse_mass);
-        self.contact_constants(reduced_mass, b.ln_restitution, 1.0, b.stiffness, b.damping)
+        self.contact_constants(reduced_mass, b.ln_restitution, 1.0, 1.0, b.stiffness, b.damping)
     }
 
     #[inline]
-    fn contact_constants(&self, mass: f32, ln_e: f32, shared_by: f32, stated_k: f32, stated_eta: f32) -> (f32, f32) {
+    fn contact_constants(
+        &self,
+        mass: f32,
+        ln_e: f32,
+        shared_by: f32,
+        counted: f32,
+        stated_k: f32,
+        stated_eta: f32,
+    ) -> (f32, f32) {
         use crate::laws::contact::{damping_ratio, dashpot};
         let k = if stated_k > 0.0 {
             stated_k
@@ -279,20 +367,20 @@ impl Model {
             let rate = self.largest_speed / (self.solver.contact_overlap * self.spacing);
             mass * (rate * rate) as f32 / shared_by
         };
-        let eta =
-            if stated_eta >= 0.0 { stated_eta } else { dashpot(damping_ratio(ln_e), k * shared_by, mass) / shared_by };
+        let n = shared_by.max(counted);
+        let eta = if stated_eta >= 0.0 { stated_eta } else { dashpot(damping_ratio(ln_e), k * n, mass) / n };
         (k, eta)
     }
 
-    /// Duration of a contact of body `a` with its like (s), all sharers of the load together.
-    pub fn contact_time(&self, a: usize) -> f64 {
+    /// Duration of a contact of body `a` with its like (s), when `sharers` contacts share the load.
+    pub fn contact_time(&self, a: usize, sharers: f32) -> f64 {
         let c = &self.contacts[a];
         if c.inverse_mass == 0.0 {
             return f64::INFINITY;
         }
         let (k, _) = self.contact_pair(a as u32, a as u32);
         let mass = 0.5 / f64::from(c.inverse_mass);
-        std::f64::consts::PI * (mass / (f64::from(k) * f64::from(c.shared_by))).sqrt()
+        std::f64::consts::PI * (mass / (f64::from(k) * f64::from(sharers))).sqrt()
     }
 
     /// Takes over the flocks and what they ask of the time step: to be smooth, and not to pass a body within a step.

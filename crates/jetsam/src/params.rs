@@ -59,6 +59,7 @@ params! {
     courant_viscous: "solver.courant_viscous", "1", 0.5, 1e-3, 1.0;
     contact_overlap: "solver.contact_overlap", "dx", 0.5, 1e-4, 1.0;
     contact_diameter: "solver.contact_diameter", "dx", 1.0, 0.1, 1.5;
+    sleep: "solver.sleep", "s", 0.5, 0.0, 1e9;
     settle: "solver.settle", "s", 0.0, 0.0, 1e3;
     fluid_density: "fluid.density", "kg/m^3", 1000.0, 1e-6, 1e6;
     fluid_viscosity: "fluid.viscosity", "Pa s", 0.001, 0.0, 1e6;
@@ -84,6 +85,11 @@ params! {
     rigid_restitution: "rigid.restitution", "1", 0.3, 0.001, 1.0;
     rigid_stiffness: "rigid.stiffness", "N/m", _, 1e-9, 1e15;
     rigid_damping: "rigid.damping", "N s/m", _, 0.0, 1e12;
+    rigid_friction: "rigid.friction", "1", 0.4, 0.0, 10.0;
+    static_friction: "static.friction", "1", _, 0.0, 10.0;
+    joint_stiffness: "joint.stiffness", "N/m", 1000.0, 0.0, 1e15;
+    joint_damping: "joint.damping", "N s/m", _, 0.0, 1e12;
+    joint_length: "joint.length", "m", _, 0.0, 1e6;
     points: "probe.points", "1", 50.0, 1.0, 10000.0;
     percentile: "probe.percentile", "%", 100.0, 50.0, 100.0;
     interval: "probe.interval", "s", _, 0.0, 1e6;

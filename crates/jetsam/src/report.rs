@@ -34,6 +34,8 @@ pub struct FrameStats {
     pub agents: usize,
     /// Fluid particles that got through a solid wall since the beginning, and particles of bodies that are now beyond one.
     pub lost: u64,
+    /// Times a body came so deep into another, or so fast, that it could have passed through, since the beginning.
+    pub fast_contacts: u64,
     /// Particles and bodies found with a value that is not finite, since the beginning.
     pub nonfinite: u64,
     /// Mean of `|rho / rho_0 - 1|` over fluid particles with full support.
@@ -112,6 +114,7 @@ impl Recorder {
             bodies: rigid_bodies(world.state()),
             agents: world.state().agents.record.len(),
             lost: ledger.lost + ledger.rigid_lost as u64,
+            fast_contacts: ledger.fast_contacts,
             nonfinite: ledger.nonfinite,
             density_error_mean: ledger.density_error_mean,
             density_error_max: ledger.density_error_max,
@@ -149,6 +152,7 @@ impl Recorder {
             agents: world.state().agents.record.len(),
             left: ledger.left,
             lost: ledger.lost + ledger.rigid_lost as u64,
+            fast_contacts: ledger.fast_contacts,
             nonfinite: ledger.nonfinite,
             density_error_mean: self.density_error_sum / self.frames.max(1) as f64,
             density_error_max: self.density_error_max,
@@ -185,6 +189,8 @@ pub struct Summary {
     pub left: u64,
     /// As in [`FrameStats`].
     pub lost: u64,
+    /// As in [`FrameStats`].
+    pub fast_contacts: u64,
     /// As in [`FrameStats`].
     pub nonfinite: u64,
     /// Mean over the frames of their mean density error.

@@ -40,6 +40,26 @@ pub struct Record {
     pub share: f32,
 }
 
+/// Of what the force on a particle of a body consists. Written by forces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Touch {
+    /// Force by fluids (N).
+    pub fluid: [f32; 3],
+    /// Force by other bodies and walls (N).
+    pub contact: [f32; 3],
+    /// Couple of the contact forces (N m): they act at the middle between two particles, not at this one's centre.
+    pub couple: [f32; 3],
+    /// Tangential displacement of what it touches, as far as friction holds it (m), E13.
+    pub slip: [f32; 3],
+    /// Particles it touches.
+    pub contacts: u32,
+    /// Their parts, summed: beside each other the particles of a face share one contact.
+    pub sharers: f32,
+    /// Of these, how many are so deep that they would pass through.
+    pub deep: u32,
+}
+
 /// All particles. Arrays are indexed alike; `segment` tells which range belongs to a kind.
 #[derive(Clone, Debug, Default)]
 pub struct Particles {
@@ -51,6 +71,8 @@ pub struct Particles {
     pub push_before: Vec<[f32; 3]>,
     /// Relative density `D = rho / rho_0`, fluid only. Written by density, or where it is integrated by drift and kick.
     pub density: Vec<f32>,
+    /// Of what the forces on bodies' particles consist, from the first rigid particle on. Written by forces.
+    pub touch: Vec<Touch>,
     /// `dD/dt` one and two steps ago (1/s), fluid only; empty where densities are summed. Written by drift.
     pub rate: Vec<[f32; 2]>,
     /// Velocity added by XSPH and shifting (m/s) and, last, `dD/dt` now (1/s), fluid only; empty when none of them is on.
@@ -176,10 +198,34 @@ pub struct Body {
     pub force: DVec3,
     /// Torque about the centre of mass (N m). Written by bodies.
     pub torque: DVec3,
+    /// Part of the force that fluids exert (N). Written by bodies.
+    pub force_fluid: DVec3,
+    /// Part of the force that other bodies and walls exert (N). Written by bodies.
+    pub force_contact: DVec3,
+    /// Part of the torque that fluids exert (N m). Written by bodies.
+    pub torque_fluid: DVec3,
+    /// Part of the torque that other bodies and walls exert (N m). Written by bodies.
+    pub torque_contact: DVec3,
+    /// Pairs of particles in contact with other bodies and walls. Written by bodies.
+    pub contacts: u32,
+    /// Contacts that share its load: the parts of its pairs, summed; 0 for what forces do not move. Written by bodies.
+    pub sharers: f32,
+    /// How long the body has been still (s); rises while it touches others and moves slowly. Written by kick.
+    pub still: f64,
+    /// Whether the body sleeps: it stays where it is until it is touched. Written by bodies and kick.
+    pub asleep: bool,
+    /// Whether some pair is so deep that it would pass through. Written by bodies.
+    pub deep: bool,
+    /// Whether fluids do not move the body, though it moves them.
+    pub one_way: bool,
+    /// Acceleration of a body that follows a script (m/s^2), else zero. Written by drift.
+    pub acceleration: DVec3,
+    /// Angular acceleration of a body that follows a script (rad/s^2), else zero. Written by drift.
+    pub angular_acceleration: DVec3,
 }
 
 impl Body {
-    /// Whether forces cannot move the body.
+    /// Whether forces cannot move the body: it stands, or follows a script (E15).
     pub fn is_static(&self) -> bool {
         self.mass.is_infinite()
     }
@@ -194,7 +240,7 @@ impl Body {
 /// Bodies and, slot by slot, their particles: a body's slots are contiguous.
 #[derive(Clone, Debug, Default)]
 pub struct Bodies {
-    /// Rigid bodies first, static bodies after.
+    /// Rigid bodies first, then bodies that follow scripts, static bodies after.
     pub body: Vec<Body>,
     /// Place of each slot in its body's frame, relative to the centre of mass (m). Constant.
     pub offset: Vec<DVec3>,
@@ -202,6 +248,16 @@ pub struct Bodies {
     pub owner: Vec<u32>,
     /// What the slot's particle shows to pairs. Written by drift; rigid slots only, static ones are constant.
     pub record: Vec<Record>,
+    /// Outward normal of each slot in its body's frame: length 1 inside a flat face, 2 inside a sheet, 0 elsewhere. Constant.
+    pub normal: Vec<[f32; 3]>,
+    /// The same in world axes. Written by drift; rigid slots only, static ones are constant.
+    pub facing: Vec<[f32; 3]>,
+    /// Tangential slip of each slot (m), E13. Written by bodies.
+    pub slip: Vec<[f32; 3]>,
+    /// Impulse on bodies by joints to what forces do not move, in this step (N s). Written by drift and kick.
+    pub joint_impulse: DVec3,
+    /// Force on bodies by springs to what forces do not move (N). Written by bodies.
+    pub joint_force: DVec3,
     /// Number of slots of rigid bodies; those of static bodies follow.
     pub rigid_slots: usize,
 }

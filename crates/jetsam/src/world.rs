@@ -53,6 +53,9 @@ pub enum Trouble {
 /// A step shorter than this fraction of the step at rest means that time stands still.
 const STALLED: f64 = 1e-4;
 
+/// A body moves no further in a step than this fraction of the contact diameter: contacts see it coming.
+const TRAVEL: f64 = 0.1;
+
 /// Momentum against the impulse from outside (E12, C9): what is missing is the residual.
 #[derive(Clone, Copy, Debug, Default)]
 struct MomentumLedger {
@@ -128,7 +131,11 @@ impl World {
     /// Length of the next step and what bounds it (E29).
     fn next_dt(&self, longest: f64) -> (f64, DtBound) {
         let ledger = self.backend.ledger();
-        let (dt, bound) = self.model.largest_dt(ledger.speed, ledger.acceleration);
+        let (mut dt, mut bound) = self.model.largest_dt(ledger.speed, ledger.acceleration);
+        let travel = TRAVEL * self.model.contact_diameter / ledger.body_speed;
+        if travel < dt && self.model.solver.dt.is_none() {
+            (dt, bound) = (travel, DtBound::Travel);
+        }
         let (longest, end) = self.next_end(longest);
         if dt >= longest {
             return (longest, end);
@@ -185,7 +192,8 @@ impl World {
             Some((_, n)) => *n += 1,
             None => self.bound_by.push((bound, 1)),
         }
-        self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force) + ledger.crossed;
+        self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force);
+        self.momentum.impulse += ledger.crossed + ledger.external_impulse;
         self.momentum.force = ledger.external_force;
         let (at_rest, _) = self.model.largest_dt(0.0, 0.0);
         let trouble = if ledger.nonfinite > 0 || !dt.is_finite() {

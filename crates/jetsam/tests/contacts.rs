@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 fn ball(x: f64, z: f64, v: [f64; 2], mass: f64, constants: &str) -> String {
     format!(
         "[[rigid]]\nshape = {{ points = [[0, 0, 0]] }}\nmass = {mass}\nposition = [{x}, 0, {z}]\n\
-         velocity = [{}, 0, {}]\n{constants}\n",
+         velocity = [{}, 0, {}]\nfriction = 0\n{constants}\n",
         v[0], v[1]
     )
 }

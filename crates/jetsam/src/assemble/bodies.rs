@@ -2,22 +2,26 @@
 
 use super::memory::{BYTES_PER_PARTICLE, check_available};
 use super::near::Near;
+use super::surface::normals;
 use crate::error::Result;
 use crate::interact::cells::Grid;
 use crate::mesh::Mesh;
 use crate::random;
+use crate::scene::motion::{Motion, Path};
 use crate::scene::solid::Solid;
-use crate::scene::{Rigid, Scene, Wall};
+use crate::scene::{Rigid, Scene, Wall, axis_angle};
 use glam::{DMat3, DQuat, DVec3};
 use std::sync::Arc;
 
 impl Scene {
     pub(super) fn rigid_bodies(&self, grid: &Grid, volume: f64, warnings: &mut Vec<String>) -> Result<Vec<NewBody>> {
         let mut all = Vec::new();
+        let dx = self.resolution.spacing;
         for (index, rigid) in self.rigid.iter().enumerate() {
             let key = format!("rigid.{index}");
             let solid = self.solid(&rigid.shape, &format!("{key}.shape"))?;
             warnings.extend(solid.warnings.iter().cloned());
+            let normals = normals(&solid.points, dx, self.world.dimensions);
             let mass = match (rigid.density, rigid.mass) {
                 (Some(d), None) => d * solid.volume,
                 (None, Some(m)) => m,
@@ -31,6 +35,7 @@ impl Scene {
                 let name = number.map_or(name.clone(), |n| format!("{name}-{n}"));
                 let mut body = NewBody::new(name, &solid, place, turn, self.world.dimensions);
                 body.mass = mass;
+                body.normal = normals.clone();
                 let inertia = solid.inertia * (mass / solid.volume);
                 body.inverse_inertia = if self.world.dimensions == 2 {
                     DMat3::from_diagonal(DVec3::Y / inertia.y_axis.y)
@@ -44,6 +49,8 @@ impl Scene {
                     body.spin = DVec3::Y * body.spin.y;
                 }
                 body.restitution = rigid.restitution;
+                body.friction = Some(rigid.friction);
+                body.one_way = rigid.one_way;
                 body.stiffness = rigid.stiffness;
                 body.damping = rigid.damping;
                 // the particles together displace the exact volume, as far as that is a small correction
@@ -159,13 +166,14 @@ impl Scene {
         let mut all = Vec::new();
         // flocks alone are held by the sides themselves
         let flocks_only = self.fluid.is_empty() && self.rigid.is_empty();
-        let walls = if flocks_only { Vec::new() } else { self.wall_points(grid, layers as i64) };
+        let (walls, facing) =
+            if flocks_only { (Vec::new(), Vec::new()) } else { self.wall_points(grid, layers as i64) };
         let mut taken = Near::new(0.5 * self.resolution.spacing);
         if !walls.is_empty() {
             for &p in &walls {
                 taken.insert(p);
             }
-            all.push(NewBody::fixed("walls".into(), walls));
+            all.push(NewBody { normal: facing, ..NewBody::fixed("walls".into(), walls) });
         }
         for (index, fixed) in self.statics.iter().enumerate() {
             let key = format!("static.{index}");
@@ -175,34 +183,51 @@ impl Scene {
             let turn = axis_angle(fixed.rotation);
             let mut body = NewBody::new(name, &solid, DVec3::from(fixed.position), turn, self.world.dimensions);
             let skin = skin(&solid.points, self.resolution.spacing, layers as i64, self.world.dimensions);
+            let normals = normals(&solid.points, self.resolution.spacing, self.world.dimensions);
+            self.check_motion(&fixed.motion, &format!("{key}.motion"))?;
+            let moves = fixed.motion != Motion::None;
             let inside =
                 |p: DVec3| (0..3).all(|a| (f64::from(grid.lower[a])..=f64::from(grid.upper[a])).contains(&p[a]));
-            let kept = skin.into_iter().map(|k| body.offset[k]).filter(|&o| {
-                let p = body.x + body.q * o;
-                inside(p) && !taken.has(p, None)
-            });
-            body.offset = kept.collect();
-            body.mass = f64::INFINITY;
-            body.inverse_inertia = DMat3::ZERO;
+            let kept: Vec<usize> = skin
+                .into_iter()
+                .filter(|&k| {
+                    let p = body.x + body.q * body.offset[k];
+                    moves || (inside(p) && !taken.has(p, None))
+                })
+                .collect();
+            body.normal = kept.iter().map(|&k| normals[k]).collect();
+            body.offset = kept.iter().map(|&k| body.offset[k]).collect();
+            body.friction = fixed.friction;
             if body.offset.is_empty() {
                 warnings.push(format!("static body `{}` has no part in the domain", body.name));
             }
-            for p in body.points() {
-                taken.insert(p);
+            if moves {
+                let path = Path::new(fixed.motion.clone(), body.x, body.q, solid.center);
+                let pose = path.at(0.0);
+                (body.x, body.q, body.v, body.spin, body.path) = (pose.x, pose.q, pose.v, pose.omega, Some(path));
+            } else {
+                for p in body.points() {
+                    taken.insert(p);
+                }
             }
             all.push(body);
         }
+        // those that move stand with the rigid bodies
+        all.sort_by_key(|b| b.path.is_none());
         // E1: a particle's volume is 1 / sum W over the static particles around (Akinci et al. 2012, eq. 4), but never
         // more than its place in a full lattice, for behind the skin the body goes on
         let support = self.solver.support * self.resolution.spacing;
         let kernel = self.solver.kernel.density();
-        let mut near = Near::new(support);
-        for body in &all {
-            for p in body.points() {
-                near.insert(p);
-            }
-        }
+        let still = all.iter().filter(|b| b.path.is_none());
+        let together = Near::of(support, still.flat_map(NewBody::points));
         for body in &mut all {
+            let alone;
+            let near = if body.path.is_some() {
+                alone = Near::of(support, body.points());
+                &alone
+            } else {
+                &together
+            };
             let full = kernel.lattice_sum(self.solver.support, self.world.dimensions);
             let sum = |p: DVec3| near.sum(p, |r| kernel.value(r, support, self.world.dimensions)) / full;
             body.particle_volume = body.points().map(|p| volume.min(1.0 / sum(p))).collect();
@@ -210,36 +235,40 @@ impl Scene {
         Ok(all)
     }
 
-    /// Particles of the domain's solid walls: `layers` deep, on the lattice that continues the domain.
-    fn wall_points(&self, grid: &Grid, layers: i64) -> Vec<DVec3> {
+    /// Particles of the domain's solid walls: `layers` deep, on the lattice that continues the domain; and their normals.
+    fn wall_points(&self, grid: &Grid, layers: i64) -> (Vec<DVec3>, Vec<[f32; 3]>) {
         let dx = self.resolution.spacing;
-        let axis = |a: usize| -> Vec<(f64, bool)> {
+        // place on an axis, and layer: -1, 1 look inwards, deeper ones count on
+        let axis = |a: usize| -> Vec<(f64, f64)> {
             if self.world.dimensions == 2 && a == 1 {
-                return vec![(0.0, false)];
+                return vec![(0.0, 0.0)];
             }
             let (min, max) = (grid.min[a], grid.max[a]);
             let n = ((max - min) / dx).round().max(1.0);
             let step = (max - min) / n;
-            let inner = (0..n as i64).map(|i| (min + (i as f64 + 0.5) * step, false));
+            let inner = (0..n as i64).map(|i| (min + (i as f64 + 0.5) * step, 0.0));
             if grid.walls[a] != Wall::Solid {
                 return inner.collect();
             }
-            let below = (0..layers).rev().map(|i| (min - (i as f64 + 0.5) * dx, true));
-            let above = (0..layers).map(|i| (max + (i as f64 + 0.5) * dx, true));
+            let below = (0..layers).rev().map(|i| (min - (i as f64 + 0.5) * dx, i as f64 + 1.0));
+            let above = (0..layers).map(|i| (max + (i as f64 + 0.5) * dx, -1.0 - i as f64));
             below.chain(inner).chain(above).collect()
         };
         let (xs, ys, zs) = (axis(0), axis(1), axis(2));
-        let mut points = Vec::new();
+        let (mut points, mut facing) = (Vec::new(), Vec::new());
         for z in &zs {
             for y in &ys {
                 for x in &xs {
-                    if x.1 || y.1 || z.1 {
+                    let layer = DVec3::new(x.1, y.1, z.1);
+                    if layer != DVec3::ZERO {
                         points.push(DVec3::new(x.0, y.0, z.0));
+                        let face = layer.length_squared() == 1.0;
+                        facing.push(if face { layer.as_vec3().to_array() } else { [0.0; 3] });
                     }
                 }
             }
         }
-        points
+        (points, facing)
     }
 }
 
@@ -257,6 +286,11 @@ pub(super) struct NewBody {
     pub(super) restitution: f64,
     pub(super) stiffness: Option<f64>,
     pub(super) damping: Option<f64>,
+    pub(super) friction: Option<f64>,
+    pub(super) one_way: bool,
+    /// Outward normal of each particle, as [`crate::state::Bodies::normal`].
+    pub(super) normal: Vec<[f32; 3]>,
+    pub(super) path: Option<Path>,
     pub(super) mesh: Option<(Arc<Mesh>, DVec3)>,
 }
 
@@ -292,20 +326,16 @@ impl NewBody {
             restitution: crate::params::default::rigid_restitution(),
             stiffness: None,
             damping: None,
+            friction: None,
+            one_way: false,
+            normal: Vec::new(),
+            path: None,
             mesh: None,
         }
     }
 
     pub(super) fn points(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.offset.iter().map(|o| self.x + self.q * *o)
-    }
-}
-
-/// Rotation from axis x, y, z and degrees.
-fn axis_angle([x, y, z, degrees]: [f64; 4]) -> DQuat {
-    match DVec3::new(x, y, z).try_normalize() {
-        Some(axis) => DQuat::from_axis_angle(axis, degrees.to_radians()),
-        None => DQuat::IDENTITY,
     }
 }
 

@@ -8,7 +8,8 @@ use crate::interact::cells::Grid;
 use crate::model::{
     ContactModel, DtBound, Factors, FluidModel, Model, cohesion_moment, cohesion_pressure, curvature_moment,
 };
-use crate::scene::{Coupling, EquationOfState, Scene, Start};
+use crate::scene::joint::{JointKind, JointModel};
+use crate::scene::{Coupling, EquationOfState, Force, Scene, Start};
 use glam::DVec3;
 
 /// Reynolds number of a spacing below which walls show a mirrored velocity to viscosity: above, the layer that does not slip
@@ -35,6 +36,7 @@ impl Scene {
         volume: f64,
         support: f64,
         bodies: &[NewBody],
+        joints: Vec<JointModel>,
         mut carver: Near,
         warnings: &mut Vec<String>,
     ) -> Result<(Model, Vec<Drop>)> {
@@ -103,11 +105,16 @@ impl Scene {
             .collect();
         let contacts = bodies
             .iter()
-            .map(|b| ContactModel {
+            .enumerate()
+            .map(|(index, b)| ContactModel {
+                jointed: joints.iter().any(|j| j.a == index || j.b == Some(index)),
+                joined: self.joined(&joints, index),
                 inverse_mass: (1.0 / b.mass) as f32,
                 ln_restitution: b.restitution.ln() as f32,
                 // a body of n particles rests on about n^(1/3) of them
                 shared_by: if b.mass.is_infinite() { 1.0 } else { (b.offset.len() as f64).cbrt() as f32 },
+                face: largest_face(b, spacing),
+                friction: b.friction.unwrap_or(-1.0) as f32,
                 stiffness: b.stiffness.unwrap_or(0.0) as f32,
                 damping: b.damping.unwrap_or(-1.0) as f32,
             })
@@ -128,7 +135,14 @@ impl Scene {
             sources,
             drains: self.drains()?,
             seed: self.world.seed,
-            fields: self.force.clone(),
+            fields: self.force.iter().filter(|f| !matches!(f, Force::Shake(_))).cloned().collect(),
+            shakes: self
+                .force
+                .iter()
+                .filter_map(|f| if let Force::Shake(s) = f { Some(s.clone()) } else { None })
+                .collect(),
+            joints,
+            paths: bodies.iter().map(|b| b.path.clone()).collect(),
             grid,
             contact_diameter: self.solver.contact_diameter * spacing,
             solver: self.solver.clone(),
@@ -144,6 +158,17 @@ impl Scene {
         };
         model.dt_bounds = self.dt_bounds(&model);
         Ok((model, fluid))
+    }
+
+    /// Bodies that a body does not touch, for a joint holds them together.
+    fn joined(&self, joints: &[JointModel], body: usize) -> Vec<u32> {
+        let held = joints.iter().zip(&self.joint).filter(|(_, said)| !said.collide).map(|(joint, _)| joint);
+        let partner = |j: &JointModel| match j.b {
+            Some(b) if j.a == body => Some(b as u32),
+            Some(b) if b == body => Some(j.a as u32),
+            _ => None,
+        };
+        held.filter_map(partner).collect()
     }
 
     /// Largest speed the scene can reach (m/s): from depth, drop height and velocities given.
@@ -198,7 +223,11 @@ impl Scene {
         }
         for body in bodies {
             let reach = body.offset.iter().map(|o| o.length()).fold(0.0, f64::max);
-            speed = speed.max(body.v.length() + body.spin.length() * reach * f64::from(body.mass.is_finite() as u8));
+            if let Some(path) = &body.path {
+                speed = speed.max(path.largest_speed(reach, self.run.seconds));
+            } else {
+                speed = speed.max(body.v.length() + body.spin.length() * reach);
+            }
         }
         // a scene in which nothing moves still needs a scale: a spacing in a tenth of a second
         if speed > 0.0 { speed } else { 10.0 * self.resolution.spacing }
@@ -262,8 +291,14 @@ impl Scene {
             viscous = viscous.min(s.courant_force * wave);
         }
         let mut contact = f64::INFINITY;
+        for joint in model.joints.iter().filter(|j| j.kind == JointKind::Spring) {
+            let inverse = |body: usize| f64::from(model.contacts[body].inverse_mass);
+            let rate = joint.stiffness * (inverse(joint.a) + joint.b.map_or(0.0, inverse));
+            contact = contact.min(std::f64::consts::PI / rate.sqrt() / 20.0);
+        }
         for a in 0..model.contacts.len() {
-            contact = contact.min(model.contact_time(a) / 20.0);
+            let c = &model.contacts[a];
+            contact = contact.min(model.contact_time(a, c.shared_by) / 20.0).min(model.contact_time(a, c.face) / 8.0);
         }
         if s.coupling == Coupling::Spring && !self.rigid.is_empty() {
             for (index, _) in self.fluid.iter().enumerate() {
@@ -281,4 +316,26 @@ impl Scene {
         }
         bounds
     }
+}
+
+/// Most particles of a body in a layer one spacing thick: as many contacts share a load at most.
+fn largest_face(body: &NewBody, spacing: f64) -> f32 {
+    if body.mass.is_infinite() {
+        return 1.0;
+    }
+    let mut most = 1;
+    for n in -1..=1 {
+        for m in -1..=1 {
+            for axis in [DVec3::new(1.0, m.into(), n.into()), DVec3::new(0.0, 1.0, n.into()), DVec3::Z] {
+                let axis = axis.normalize();
+                let mut layers = std::collections::BTreeMap::new();
+                for o in &body.offset {
+                    let count = layers.entry((o.dot(axis) / spacing).round() as i64).or_insert(0);
+                    *count += 1;
+                    most = most.max(*count);
+                }
+            }
+        }
+    }
+    most as f32
 }

@@ -9,20 +9,23 @@ mod flocks;
 mod fluid;
 mod memory;
 mod near;
+mod relax;
 mod sources;
 mod start;
+mod surface;
 
 use crate::error::Result;
 use crate::interact::cells::Grid;
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::scene::{Density, Scene, Shape, Wall};
-use crate::state::{Bodies, Body, Particles, Record, State};
+use crate::scene::{Density, Force, Scene, Shape, Wall};
+use crate::state::{Bodies, Body, Particles, Record, State, Touch};
 use bodies::NewBody;
 use fluid::Drop;
 use glam::{DMat3, DVec3};
 use memory::{BYTES_PER_CELL, BYTES_PER_PARTICLE, available_gigabytes, check_available};
 use near::Near;
+use relax::relax;
 use std::sync::Arc;
 
 /// Fluid closer to a body's particle than this many spacings is carved away.
@@ -56,18 +59,27 @@ impl Scene {
         self.check_memory(&grid)?;
 
         let mut bodies = self.rigid_bodies(&grid, volume, &mut warnings)?;
-        let rigid_count = bodies.len();
         bodies.extend(self.static_bodies(&grid, volume, layers as usize, &mut warnings)?);
+        let rigid_count = bodies.iter().filter(|b| b.mass.is_finite() || b.path.is_some()).count();
+        let named: Vec<_> = bodies.iter().map(|b| (b.name.as_str(), b.x, b.q, b.mass.is_finite())).collect();
+        let mut joints = self.joints(&named)?;
+        let gravity = DVec3::from(self.world.gravity);
+        let up = (-gravity).try_normalize().unwrap_or(DVec3::Z);
+        let diameter = self.solver.contact_diameter * spacing;
+        relax(&mut bodies, &joints, diameter, dimensions, up, &mut warnings);
+        if !joints.is_empty() {
+            let named: Vec<_> = bodies.iter().map(|b| (b.name.as_str(), b.x, b.q, b.mass.is_finite())).collect();
+            joints = self.joints(&named)?;
+        }
         let mut carver = Near::new(CARVE * spacing);
         for body in &bodies {
             for p in body.points() {
                 carver.insert(p);
             }
         }
-        warn_of_overlap(&bodies[..], spacing, &mut warnings);
         let flocks = self.flock_constants()?;
         let agents = self.agents(&flocks, &grid, &self.obstacles(&flocks, &bodies))?;
-        let (mut model, fluid) = self.derive(grid, volume, support, &bodies, carver, &mut warnings)?;
+        let (mut model, fluid) = self.derive(grid, volume, support, &bodies, joints, carver, &mut warnings)?;
         model.add_flocks(flocks);
         model.warnings = warnings;
         let meshes = bodies.iter().map(|b| b.mesh.clone()).collect();
@@ -94,6 +106,11 @@ impl Scene {
         if self.world.dimensions == 2 && (self.world.gravity[1] != 0.0) {
             let message = "a 2D scene lies in the x-z plane, but gravity has a y component";
             return Err(self.error("world.gravity", message, "give gravity = [x, 0, z]"));
+        }
+        for (index, force) in self.force.iter().enumerate() {
+            if let Force::Shake(shake) = force {
+                self.check_period(shake.period, &format!("force.{index}.shake"))?;
+            }
         }
         if self.fluid.is_empty() && self.rigid.is_empty() && self.flock.is_empty() {
             return Err(self.error(
@@ -148,27 +165,6 @@ impl Scene {
     }
 }
 
-fn warn_of_overlap(bodies: &[NewBody], spacing: f64, warnings: &mut Vec<String>) {
-    let mut near = Near::new(0.5 * spacing);
-    for (index, body) in bodies.iter().enumerate() {
-        if body.mass.is_infinite() {
-            continue;
-        }
-        for p in body.points() {
-            near.insert_tagged(p, index as u32);
-        }
-    }
-    for (index, body) in bodies.iter().enumerate() {
-        let deep = body.points().filter(|&p| near.has(p, Some(index as u32))).count();
-        if deep > 0 {
-            warnings.push(format!(
-                "body `{}` overlaps another by {deep} particles: contacts will push them apart",
-                body.name
-            ));
-        }
-    }
-}
-
 /// Puts fluid and bodies into one state.
 fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) -> State {
     let mut bodies = Bodies::default();
@@ -188,7 +184,22 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
             omega: b.spin,
             force: DVec3::ZERO,
             torque: DVec3::ZERO,
+            force_fluid: DVec3::ZERO,
+            force_contact: DVec3::ZERO,
+            torque_fluid: DVec3::ZERO,
+            torque_contact: DVec3::ZERO,
+            contacts: 0,
+            sharers: 0.0,
+            still: 0.0,
+            asleep: false,
+            deep: false,
+            one_way: b.one_way,
+            acceleration: DVec3::ZERO,
+            angular_acceleration: DVec3::ZERO,
         };
+        if let Some(path) = &b.path {
+            crate::integrate::bodies::script(&mut body, path, 0.0);
+        }
         if b.mass.is_finite() {
             let inertia_world = if model.dimensions == 2 {
                 DMat3::from_diagonal(DVec3::Y / b.inverse_inertia.y_axis.y)
@@ -198,10 +209,13 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
             body.l = inertia_world * b.spin;
             body.l_half = body.l;
         }
-        for (offset, volume) in b.offset.into_iter().zip(b.particle_volume) {
+        for ((offset, volume), normal) in b.offset.into_iter().zip(b.particle_volume).zip(b.normal) {
             let mut record = Record { volume: volume as f32, ..Record::default() };
             crate::integrate::bodies::place(&mut record, &body, offset, model);
             bodies.offset.push(offset);
+            bodies.normal.push(normal);
+            bodies.facing.push(crate::integrate::bodies::face(&body, normal));
+            bodies.slip.push([0.0; 3]);
             bodies.owner.push(index as u32);
             bodies.record.push(record);
         }
@@ -222,6 +236,7 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
         push: vec![[0.0; 3]; total],
         push_before: vec![[0.0; 3]; room],
         density: vec![1.0; room],
+        touch: vec![Touch::default(); total - room],
         rate: vec![[0.0; 2]; if integrated { room } else { 0 }],
         carry: vec![[0.0; 4]; if carried { room } else { 0 }],
         gradient: vec![[0.0; 4]; if model.wants_gradients() { room } else { 0 }],

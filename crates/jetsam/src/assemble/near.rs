@@ -14,6 +14,12 @@ impl Near {
         Self { radius, cells: HashMap::new() }
     }
 
+    pub(super) fn of(radius: f64, points: impl Iterator<Item = DVec3>) -> Self {
+        let mut near = Self::new(radius);
+        points.for_each(|p| near.insert(p));
+        near
+    }
+
     fn key(&self, p: DVec3) -> [i64; 3] {
         (p / self.radius).floor().as_i64vec3().to_array()
     }
@@ -44,16 +50,21 @@ impl Near {
         total
     }
 
-    fn each(&self, p: DVec3, mut f: impl FnMut(f64, u32)) {
+    /// Calls `f(d, tag)` with the vector to each point in the cells around.
+    pub(super) fn around(&self, p: DVec3, mut f: impl FnMut(DVec3, u32)) {
         let c = self.key(p);
         for k in -1..=1 {
             for j in -1..=1 {
                 for i in -1..=1 {
                     for &(q, tag) in self.cells.get(&[c[0] + i, c[1] + j, c[2] + k]).into_iter().flatten() {
-                        f(p.distance(q), tag);
+                        f(q - p, tag);
                     }
                 }
             }
         }
+    }
+
+    fn each(&self, p: DVec3, mut f: impl FnMut(f64, u32)) {
+        self.around(p, |d, tag| f(d.length(), tag));
     }
 }

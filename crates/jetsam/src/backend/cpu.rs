@@ -5,19 +5,21 @@
 
 use super::Backend;
 use crate::flock::{Crowd, Surroundings};
-use crate::integrate::{Advance, bodies, particles, sources};
+use crate::integrate::sleep::{self, Rest};
+use crate::integrate::{Advance, bodies, joints, particles, sources};
 use crate::interact::cells::{Cells, Grid};
+use crate::interact::contacts::Surfaces;
 use crate::interact::neighbours::{Around, NeighbourChunk, Places, with_scratch};
 use crate::interact::{CHUNK, boundary, density, forces, gradients, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
 use crate::scene::Density;
 use crate::stage::Stage;
-use crate::state::{Body, Kind, Record, State};
+use crate::state::{Body, Kind, Record, State, Touch};
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 /// The CPU backend.
 pub struct Cpu {
@@ -35,6 +37,14 @@ pub struct Cpu {
     mirror: Vec<[f32; 4]>,
     parts: Vec<bodies::Part>,
     particle_mass: Vec<f32>,
+    /// Angular velocity of each body (rad/s), for contacts.
+    spin: Vec<[f32; 3]>,
+    /// Which bodies sleep, what each is to those that touch it, and which were touched by what moves.
+    asleep: Vec<bool>,
+    rest: Vec<Rest>,
+    stirred: Vec<AtomicBool>,
+    /// Contacts that shared the load of each body.
+    sharers: Vec<f32>,
     sums: Vec<Ledger>,
     ledger: Ledger,
     static_copies: u32,
@@ -71,6 +81,11 @@ impl Default for Cpu {
             mirror: Vec::new(),
             parts: Vec::new(),
             particle_mass: Vec::new(),
+            spin: Vec::new(),
+            sharers: Vec::new(),
+            asleep: Vec::new(),
+            rest: Vec::new(),
+            stirred: Vec::new(),
             sums: Vec::new(),
             ledger: Ledger::default(),
             static_copies: 0,
@@ -101,6 +116,7 @@ impl Backend for Cpu {
         self.places = Places::new(p.record.len());
         self.share = vec![0.0; state.particles.record.len()];
         self.parts = bodies::parts(&state.bodies.body);
+        self.stirred = state.bodies.body.iter().map(|_| AtomicBool::new(false)).collect();
         self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
         self.ledger = Ledger::default();
         self.static_copies = 0;
@@ -117,16 +133,16 @@ impl Backend for Cpu {
             Stage::Cells => self.sort(model),
             Stage::Density => self.density(model),
             Stage::Pressure => self.pressure(model),
-            Stage::Boundary => self.boundary(model),
+            Stage::Boundary => self.boundary(model, advance),
             Stage::Gradients => self.gradients(model),
             Stage::Forces => {
                 self.forces(model, advance);
                 self.held = sources::hold(&mut self.state.particles, model);
             }
             Stage::Agents => self.agents(model, advance),
-            Stage::Bodies => self.bodies(model),
+            Stage::Bodies => self.bodies(model, advance),
             Stage::Kick => self.kick(model, advance),
-            Stage::Ledger => self.tally(model),
+            Stage::Ledger => self.tally(model, advance),
         }
     }
 
@@ -168,6 +184,12 @@ impl Cpu {
                 .for_each(|((density, rate), carry)| particles::predict(advance, density, rate, carry));
         }
         if advance.drag == 0.0 {
+            let paths = model.paths.par_iter().with_min_len(CHUNK);
+            b.body.par_iter_mut().zip(paths).for_each(|(body, path)| match path {
+                Some(path) => bodies::script(body, path, advance.end()),
+                None => bodies::half_kick(body, model, advance.dt),
+            });
+            joints::drift(b, model, advance.dt);
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::drift(body, model, advance.dt));
             bodies::follow(b, model);
         }
@@ -301,6 +323,8 @@ impl Cpu {
     }
 
     fn density(&mut self, model: &Model) {
+        self.asleep.clear();
+        self.asleep.extend(self.state.bodies.body.iter().map(|b| b.asleep));
         let p = &mut self.state.particles;
         let around = Around {
             grid: &model.grid,
@@ -309,6 +333,7 @@ impl Cpu {
             owner: &p.owner,
             cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
             first: p.first,
+            asleep: &self.asleep,
             support: model.support as f32,
         };
         let (count, first) = (p.count, p.first);
@@ -347,9 +372,9 @@ impl Cpu {
             .for_each(|((records, density), owner)| pressure::chunk(model, records, density, owner));
     }
 
-    fn boundary(&mut self, model: &Model) {
-        let p = &mut self.state.particles;
-        let level = self.level;
+    fn boundary(&mut self, model: &Model, advance: Advance) {
+        let State { particles: p, bodies: b, .. } = &mut self.state;
+        let (level, gravity) = (self.level, model.gravity_at(advance.end()).as_vec3());
         if model.no_slip {
             self.mirror.resize(p.record.len(), [0.0; 4]);
         }
@@ -363,7 +388,7 @@ impl Cpu {
                     return mirror.fill([0.0; 4]);
                 }
                 dispatch!(level, simd => {
-                    boundary::chunk(simd, model, records, owner, first + c * CHUNK, chunk, share, mirror);
+                    boundary::chunk(simd, model, records, owner, &b.body, gravity, first + c * CHUNK, chunk, share, mirror);
                 });
             };
             let chunks = chunks_mut!(self.share, segment.clone()).zip(neighbours).enumerate();
@@ -398,39 +423,73 @@ impl Cpu {
     }
 
     fn forces(&mut self, model: &Model, advance: Advance) {
-        let p = &mut self.state.particles;
+        let State { particles: p, bodies: b, .. } = &mut self.state;
         let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
+        self.spin.clear();
+        self.spin.extend(b.body.iter().map(|b| b.omega.as_vec3().to_array()));
+        self.sharers.clear();
+        self.sharers.extend(b.body.iter().map(|b| b.sharers));
+        self.rest.clear();
+        self.rest.extend(b.body.iter().map(|b| sleep::rest(b)));
+        self.stirred.iter_mut().for_each(|s| *s.get_mut() = false);
+        let (spin, sharers, rest, stirred) = (&self.spin, &self.sharers, &self.rest, &self.stirred);
+        let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slip: &b.slip, sharers, rest, stirred, spin };
+        let gravity = model.gravity_at(advance.end()).as_vec3();
+        let bodies_first = p.first[Kind::Rigid as usize];
         let (mirror, gradient) = (&self.mirror[..], &p.gradient[..]);
         let (dt, fastest) = (advance.dt as f32, self.ledger.speed as f32);
         for kind in Kind::ALL {
             let first = p.first[kind as usize];
             let segment = first..first + p.count[kind as usize];
             let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
-            let work = |c: usize, push: &mut [[f32; 3]], chunk: &NeighbourChunk, carry: &mut _, vorticity: &mut _| {
+            let work = |c: usize,
+                        push: &mut [[f32; 3]],
+                        chunk: &NeighbourChunk,
+                        carry: &mut _,
+                        vorticity: &mut _,
+                        touch: &mut [Touch]| {
                 if !chunk.found && kind == Kind::Static {
+                    touch.fill(Touch::default());
                     return push.fill([0.0; 3]);
                 }
                 let first = first + c * CHUNK;
-                let input =
-                    forces::Input { model, records, mirror, gradient, owner, first, particle_mass, dt, fastest };
-                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry, vorticity));
+                let input = forces::Input {
+                    model,
+                    records,
+                    mirror,
+                    gradient,
+                    owner,
+                    first,
+                    particle_mass,
+                    surfaces,
+                    gravity,
+                    dt,
+                    fastest,
+                };
+                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry, vorticity, touch));
             };
-            let fluid = kind == Kind::Fluid;
-            match (fluid && !p.carry.is_empty(), fluid && !gradient.is_empty()) {
+            if kind != Kind::Fluid {
+                let touch = p.touch[first - bodies_first..].par_chunks_mut(CHUNK);
+                chunks.zip(touch).for_each(|((c, (push, chunk)), touch)| work(c, push, chunk, &mut [], &mut [], touch));
+                continue;
+            }
+            match (!p.carry.is_empty(), !gradient.is_empty()) {
                 (true, true) => {
                     let (carry, vorticity) = (p.carry.par_chunks_mut(CHUNK), p.vorticity.par_chunks_mut(CHUNK));
                     let all = chunks.zip(carry).zip(vorticity);
-                    all.for_each(|(((c, (push, chunk)), carry), vorticity)| work(c, push, chunk, carry, vorticity));
+                    all.for_each(|(((c, (push, chunk)), carry), vorticity)| {
+                        work(c, push, chunk, carry, vorticity, &mut [])
+                    });
                 }
                 (true, false) => {
                     let all = chunks.zip(p.carry.par_chunks_mut(CHUNK));
-                    all.for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry, &mut []));
+                    all.for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry, &mut [], &mut []));
                 }
                 (false, true) => {
                     let all = chunks.zip(p.vorticity.par_chunks_mut(CHUNK));
-                    all.for_each(|((c, (push, chunk)), vorticity)| work(c, push, chunk, &mut [], vorticity));
+                    all.for_each(|((c, (push, chunk)), vorticity)| work(c, push, chunk, &mut [], vorticity, &mut []));
                 }
-                (false, false) => chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut [], &mut [])),
+                (false, false) => chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut [], &mut [], &mut [])),
             }
         }
     }
@@ -443,14 +502,26 @@ impl Cpu {
         self.ledger.nonfinite += self.crowd.nonfinite as u64;
     }
 
-    fn bodies(&mut self, model: &Model) {
+    fn bodies(&mut self, model: &Model, advance: Advance) {
         let State { particles: p, bodies: b, .. } = &mut self.state;
-        let (place, push) = (&self.place, &p.push);
-        let force = |slot: usize| match place[slot].load(Relaxed) {
-            GONE => [0.0; 3],
-            at => push[at as usize],
+        let (place, push, touch, first) = (&self.place, &p.push, &p.touch, p.first[Kind::Rigid as usize]);
+        let felt = |slot: usize| match place[slot].load(Relaxed) {
+            GONE => None,
+            at => Some((&push[at as usize], &touch[at as usize - first])),
         };
-        bodies::sum(b, &mut self.parts, force, model);
+        let before: Vec<bool> = b.body.iter().map(|b| b.deep).collect();
+        bodies::sum(b, &mut self.parts, felt, model.gravity_at(advance.end()), model.dimensions);
+        joints::springs(b, model);
+        for (body, before) in b.body.iter_mut().zip(before) {
+            let far = body.contacts > 0 && body.v.length() * advance.dt > 0.5 * model.contact_diameter;
+            body.deep |= far && !body.is_static();
+            self.ledger.fast_contacts += u64::from(body.deep && !before && !body.is_static());
+        }
+        b.slip[..b.rigid_slots].par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(slot, slip)| {
+            if !b.body[b.owner[slot] as usize].asleep {
+                *slip = felt(slot).map_or([0.0; 3], |(_, touch)| touch.slip);
+            }
+        });
     }
 
     fn kick(&mut self, model: &Model, advance: Advance) {
@@ -472,10 +543,17 @@ impl Cpu {
         }
         if advance.drag == 0.0 {
             b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::kick(body, integrator, advance.dt));
+            joints::kick(b, model);
+            if sleep::possible(model) {
+                for (body, (stirred, contact)) in b.body.iter_mut().zip(self.stirred.iter_mut().zip(&model.contacts)) {
+                    sleep::update(body, model, contact.jointed, *stirred.get_mut(), advance.dt);
+                }
+            }
         }
     }
 
-    fn tally(&mut self, model: &Model) {
+    fn tally(&mut self, model: &Model, advance: Advance) {
+        let gravity = model.gravity_at(advance.end());
         let State { particles: p, bodies: b, .. } = &self.state;
         let fluid = p.segment(Kind::Fluid);
         let n = fluid.len();
@@ -491,6 +569,7 @@ impl Cpu {
                 owner: &p.owner[range.clone()],
                 confined: p.vorticity.get(range).filter(|_| model.solver.vorticity > 0.0),
                 neighbours: &neighbours[c],
+                gravity,
             };
             part.tally(model, sum);
         });
@@ -499,11 +578,13 @@ impl Cpu {
             born: self.ledger.born,
             drained: self.ledger.drained,
             crossed: self.ledger.crossed,
-            external_force: self.held,
             lost: self.ledger.lost,
             nonfinite: self.ledger.nonfinite,
+            fast_contacts: self.ledger.fast_contacts,
+            external_force: self.held + b.joint_force,
+            external_impulse: b.joint_impulse,
             fluid: n,
-            rigid_lost: self.cells[Kind::Rigid as usize].lost,
+            rigid_lost: self.cells[Kind::Rigid as usize].lost.saturating_sub(self.scripted_outside(model)),
             ..Ledger::default()
         };
         let mut full = 0.0;
@@ -531,7 +612,10 @@ impl Cpu {
             }
             total.momentum += body.mass * body.v;
             total.momentum_scale += body.mass * body.v.length();
-            total.external_force += body.mass * model.gravity;
+            total.external_force += body.mass * gravity;
+            if body.one_way {
+                total.external_force -= body.force_fluid;
+            }
             total.total_force += body.force;
             total.kinetic += 0.5 * (body.mass * body.v.length_squared() + body.l.dot(body.omega));
             total.potential -= body.mass * model.gravity.dot(body.x - model.grid.min);
@@ -541,13 +625,24 @@ impl Cpu {
             }
         }
         for (slot, record) in b.record[..b.rigid_slots].iter().enumerate() {
-            total.speed = total.speed.max(f64::from(glam::Vec3::from(record.v).length()));
-            if !model.fields.is_empty() {
+            total.body_speed = total.body_speed.max(f64::from(glam::Vec3::from(record.v).length()));
+            if !model.fields.is_empty() && model.moves(b.owner[slot]) {
                 let mass = f64::from(self.particle_mass[b.owner[slot] as usize]);
                 total.external_force += mass * forces::fields(model, record).as_dvec3();
             }
         }
+        total.speed = total.speed.max(total.body_speed);
         self.ledger = total;
+    }
+
+    /// Particles of scripted bodies that are now beyond a solid wall: they may.
+    fn scripted_outside(&self, model: &Model) -> usize {
+        if self.cells[Kind::Rigid as usize].lost == 0 {
+            return 0;
+        }
+        let b = &self.state.bodies;
+        let outside = |slot: &usize| self.place[*slot].load(Relaxed) == GONE;
+        (0..b.rigid_slots).filter(|&slot| !model.moves(b.owner[slot])).filter(outside).count()
     }
 }
 
@@ -559,6 +654,7 @@ struct Part<'a> {
     owner: &'a [u32],
     confined: Option<&'a [[f32; 3]]>,
     neighbours: &'a NeighbourChunk,
+    gravity: DVec3,
 }
 
 impl Part<'_> {
@@ -576,7 +672,7 @@ impl Part<'_> {
             sum.momentum_scale += mass * speed;
             sum.total_force += mass * a;
             sum.force_scale += mass * a.length();
-            let mut outside = model.gravity;
+            let mut outside = self.gravity;
             if !model.fields.is_empty() {
                 outside += forces::fields(model, r).as_dvec3();
             }

@@ -4,7 +4,9 @@
 //! the step, because viscosity and dashpots need them there. Kick corrects the prediction with the new forces.
 
 pub mod bodies;
+pub mod joints;
 pub mod particles;
+pub mod sleep;
 pub mod sources;
 
 /// How a step advances time.
@@ -24,5 +26,12 @@ impl Advance {
     /// How far rates are extrapolated from the last two steps: half a step in units of the step before.
     fn ahead(&self) -> f32 {
         if self.dt_before > 0.0 { (0.5 * self.dt / self.dt_before) as f32 } else { 0.0 }
+    }
+}
+
+impl Advance {
+    /// Time at the end of the step (s).
+    pub fn end(&self) -> f64 {
+        self.time + self.dt
     }
 }

@@ -11,16 +11,20 @@ use crate::laws::fluid;
 use crate::laws::kernel::each_kernel;
 use crate::model::Model;
 use crate::scene::PressureForce;
-use crate::state::{Kind, Record};
+use crate::state::{Body, Kind, Record};
 use fearless_simd::Simd;
+use glam::{DVec3, Vec3};
 
 /// Pressure shares of a chunk of bodies' particles. `records` are all particles; `first` is the chunk's first.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)] // one caller
 pub fn chunk<S: Simd>(
     simd: S,
     model: &Model,
     records: &[Record],
     owner: &[u32],
+    bodies: &[Body],
+    gravity: Vec3,
     first: usize,
     chunk: &NeighbourChunk,
     share: &mut [f32],
@@ -29,9 +33,9 @@ pub fn chunk<S: Simd>(
     let kernel = model.kernel.density();
     let inverse = model.inverse_support();
     let limit = (model.support * model.support) as f32;
-    let pull = match model.solver.pressure_force {
-        PressureForce::Symmetric => model.gravity_f32(),
-        PressureForce::Mueller => 0.5 * model.gravity_f32(), // its shares are half pressures
+    let half = match model.solver.pressure_force {
+        PressureForce::Symmetric => 1.0,
+        PressureForce::Mueller => 0.5, // its shares are half pressures
     };
     let floor = if model.solver.negative_pressure { f32::NEG_INFINITY } else { 0.0 };
     let listed = Listed::new(simd, records, chunk.list());
@@ -44,6 +48,7 @@ pub fn chunk<S: Simd>(
         if runs.count(Kind::Fluid) == 0 {
             continue;
         }
+        let pull = half * (gravity - acceleration(&bodies[owner[first + k] as usize], own));
         let (mut total, mut weight): (Lanes, Lanes) = ([0.0; LANES], [0.0; LANES]);
         let mut flow: [Lanes; 3] = [[0.0; LANES]; 3];
         for near in listed.run(runs.padded(Kind::Fluid)) {
@@ -85,4 +90,15 @@ pub fn chunk<S: Simd>(
             }
         }
     }
+}
+
+/// Acceleration of a particle of a scripted body (m/s^2): the wall's of Adami et al. 2012, eq. 27.
+#[inline(always)]
+fn acceleration(body: &Body, own: &Record) -> Vec3 {
+    let (a, alpha) = (body.acceleration, body.angular_acceleration);
+    if a == DVec3::ZERO && alpha == DVec3::ZERO && (body.omega == DVec3::ZERO || !body.is_static()) {
+        return Vec3::ZERO;
+    }
+    let arm = DVec3::from(own.x.map(f64::from)) - body.x;
+    (a + alpha.cross(arm) + body.omega.cross(body.omega.cross(arm))).as_vec3()
 }

@@ -1,8 +1,10 @@
 //! Stage `forces`: every law of pairs, evaluated from both ends of each pair (E4-E8, E10-E12, E16, E17, E30).
 //!
 //! In: neighbour runs, records with pressure shares. Out: `push`, an acceleration (m/s^2) for fluids and a force
-//! (N) for the particles of bodies; `carry` for XSPH, shifting and the rate of density. Sums over SPH pairs are in [`super::pairs`], contacts here.
+//! (N) for the particles of bodies; `touch`, of what that force consists; `carry` for XSPH, shifting and the rate of density. Sums over SPH pairs are in [`super::pairs`], contacts of
+//! bodies in [`super::contacts`].
 
+use super::contacts::{self, Friction, Surfaces};
 use super::gradients::confinement;
 use super::lanes::{LANES, Listed};
 use super::neighbours::{NeighbourChunk, Runs};
@@ -10,7 +12,7 @@ use super::pairs::{Ends, Pairs, Terms, wrap};
 use crate::laws::{contact, field};
 use crate::model::Model;
 use crate::scene::{Coupling, Damping, Force};
-use crate::state::{Kind, Record};
+use crate::state::{Kind, Record, Touch};
 use fearless_simd::Simd;
 use glam::{DVec3, Vec3};
 
@@ -31,6 +33,10 @@ pub struct Input<'a> {
     pub first: usize,
     /// Mass of the particles of each body (kg), for fields.
     pub particle_mass: &'a [f32],
+    /// What contacts know of bodies.
+    pub surfaces: Surfaces<'a>,
+    /// Gravity now (m/s^2), shaking of the scene included.
+    pub gravity: Vec3,
     /// Length of the step (s).
     pub dt: f32,
     /// Largest speed of any particle (m/s), for shifting.
@@ -39,6 +45,7 @@ pub struct Input<'a> {
 
 /// Forces on a chunk of particles of one kind. `carry` may be empty.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)] // one caller
 pub fn chunk<S: Simd>(
     simd: S,
     input: Input,
@@ -47,16 +54,18 @@ pub fn chunk<S: Simd>(
     push: &mut [[f32; 3]],
     carry: &mut [[f32; 4]],
     vorticity: &mut [[f32; 3]],
+    touch: &mut [Touch],
 ) {
     // most scenes ask for no more than pressure and viscosity: the rest is then not even compiled in
     if input.model.plain() && input.mirror.is_empty() {
-        particles::<S, true>(simd, input, kind, chunk, push, carry, vorticity);
+        particles::<S, true>(simd, input, kind, chunk, push, carry, vorticity, touch);
     } else {
-        particles::<S, false>(simd, input, kind, chunk, push, carry, vorticity);
+        particles::<S, false>(simd, input, kind, chunk, push, carry, vorticity, touch);
     }
 }
 
 #[inline(always)]
+#[allow(clippy::too_many_arguments)] // one caller
 fn particles<S: Simd, const PLAIN: bool>(
     simd: S,
     input: Input,
@@ -65,12 +74,13 @@ fn particles<S: Simd, const PLAIN: bool>(
     push: &mut [[f32; 3]],
     carry: &mut [[f32; 4]],
     vorticity: &mut [[f32; 3]],
+    touch: &mut [Touch],
 ) {
     let listed = Listed::new(simd, input.records, chunk.list());
     for (k, runs) in chunk.runs.iter().enumerate() {
         let i = input.first + k;
         if kind != Kind::Fluid {
-            push[k] = on_body::<S, PLAIN>(simd, &input, kind, listed, runs, i).to_array();
+            (push[k], touch[k]) = on_body::<S, PLAIN>(simd, &input, kind, listed, runs, i);
             continue;
         }
         let (pairs, mut total) = on_fluid::<S, PLAIN>(simd, &input, listed, runs, i);
@@ -127,6 +137,9 @@ fn on_fluid<'a, S: Simd, const PLAIN: bool>(
     for near in run(Kind::Static) {
         pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
     }
+    for &j in listed.indices(runs.exact(Kind::Rigid)) {
+        input.surfaces.wet(input.owner[j as usize]);
+    }
     if model.solver.coupling == Coupling::Pressure {
         for near in run(Kind::Rigid) {
             pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
@@ -139,11 +152,11 @@ fn on_fluid<'a, S: Simd, const PLAIN: bool>(
             contacts += sum_contacts(input, own, list, |(_, body)| Some(model.coupling_pair(owner, body)));
         }
     }
-    let push = (pairs.force(simd) + contacts) / me.mass + model.gravity_f32() + fields(model, own);
+    let push = (pairs.force(simd) + contacts) / me.mass + input.gravity + fields(model, own);
     (pairs, push)
 }
 
-/// Force on a particle of a body.
+/// Force on a particle of a body, and of what it consists.
 #[inline(always)]
 fn on_body<S: Simd, const PLAIN: bool>(
     simd: S,
@@ -152,7 +165,7 @@ fn on_body<S: Simd, const PLAIN: bool>(
     listed: Listed,
     runs: &Runs,
     i: usize,
-) -> Vec3 {
+) -> ([f32; 3], Touch) {
     let model = input.model;
     let own = &input.records[i];
     let owner = input.owner[i];
@@ -177,14 +190,17 @@ fn on_body<S: Simd, const PLAIN: bool>(
     force += sum_contacts(input, own, fluids, |(other, fluid)| {
         springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
     });
+    let mut touch = Touch { fluid: force.to_array(), ..Touch::default() };
+    let mut friction = Friction::default();
     for other in [Kind::Rigid, Kind::Static] {
-        let list = listed.indices(runs.exact(other));
-        force += sum_contacts(input, own, list, |(_, body)| Some(model.contact_pair(owner, body)));
+        contacts::add(input, i, listed.indices(runs.exact(other)), &mut touch, &mut friction);
     }
-    if kind == Kind::Rigid {
+    force += Vec3::from(touch.contact);
+    if model.moves(owner) {
+        touch.slip = friction.slip();
         force += fields(model, own) * input.particle_mass[owner as usize];
     }
-    force
+    (force.to_array(), touch)
 }
 
 /// Whether a fluid particle meets particles of bodies of a kind by springs (E16): where that is the coupling, and
@@ -194,7 +210,7 @@ fn springs(model: &Model, kind: Kind, fluid: &Record) -> bool {
     (kind == Kind::Rigid && model.solver.coupling == Coupling::Spring) || fluid.share <= 0.0
 }
 
-/// Sum of contact forces (E12) on a particle. `constants` gives spring and dashpot for the other and its owner, or
+/// Sum of the forces (E12) of springs between a fluid's particle and bodies'. `constants` gives spring and dashpot for the other and its owner, or
 /// `None` where there is no contact.
 #[inline(always)]
 fn sum_contacts(
@@ -231,6 +247,7 @@ pub fn fields(model: &Model, own: &Record) -> Vec3 {
         let a = match *force {
             Force::Point { center, strength, core } => field::point_gravity(away(center), strength as f32, core as f32),
             Force::Wind { velocity, rate } => field::wind(own.v, single(velocity).to_array(), rate as f32),
+            Force::Shake(_) => continue, // part of gravity
             Force::Vortex { center, axis, speed, core, rate } => {
                 let axis = single(axis).normalize_or_zero().to_array();
                 field::vortex(away(center), own.v, axis, speed as f32, core as f32, rate as f32)

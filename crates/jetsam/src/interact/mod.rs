@@ -1,9 +1,10 @@
-//! Chapter 2, interaction: cells, neighbours and density, pressure, boundary pressure, forces.
+//! Chapter 2, interaction: cells, neighbours and density, pressure, boundary pressure, forces, contacts of bodies.
 //!
 //! Each file is one stage; [`crate::backend::Cpu`] calls them in the order of [`crate::stage`].
 
 pub mod boundary;
 pub mod cells;
+pub mod contacts;
 pub mod density;
 pub mod forces;
 pub mod gradients;

@@ -117,6 +117,8 @@ pub struct Around<'a> {
     pub cells: [&'a Cells; Kind::COUNT],
     /// First particle of each kind's segment.
     pub first: [usize; Kind::COUNT],
+    /// Whether each body sleeps: its particles look for no neighbours.
+    pub asleep: &'a [bool],
     /// Support radius (m).
     pub support: f32,
 }
@@ -157,8 +159,10 @@ impl NeighbourChunk {
         while from < members.end {
             let cell = around.grid.coordinates(around.records[from].x);
             let to = members.end.min(around.first[kind as usize] + around.cells[kind as usize].end(cell));
+            let asleep = |i: usize| kind == Kind::Rigid && around.asleep[around.owner[i] as usize];
+            let all_asleep = (from..to).all(asleep);
             let mut candidates = 0;
-            for &k in acting(kind) {
+            for &k in if all_asleep { &[] } else { acting(kind) } {
                 scratch.tile[k as usize].pack(simd, &around, k, cell, (kind, k) == (Kind::Rigid, Kind::Rigid));
                 candidates += padded(scratch.tile[k as usize].len);
             }
@@ -180,7 +184,7 @@ impl NeighbourChunk {
             }
             for i in from..to {
                 let mut runs = Runs { begin: used as u32, count: [0; Kind::COUNT] };
-                for &k in acting(kind) {
+                for &k in if asleep(i) { &[] } else { acting(kind) } {
                     let tile = &scratch.tile[k as usize];
                     if tile.len == 0 {
                         continue;

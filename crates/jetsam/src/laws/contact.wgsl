@@ -39,3 +39,37 @@ fn damping_ratio(ln_e: f32) -> f32 {
 fn dashpot(zeta: f32, k: f32, m: f32) -> f32 {
   return 2.0 * zeta * sqrt(k * m);
 }
+
+// Unit normal of a contact, from i towards j. A particle inside a flat face carries the face's outward normal (length 1,
+// or 2 where the face is a sheet with two sides), others carry zero. Faces are planes, not rows of balls; where no
+// face is there, or the pair stands beside it, the line of centres counts. Antisymmetric in i and j.
+fn contact_normal(d_ij: vec3<f32>, r: f32, facing_i: vec3<f32>, facing_j: vec3<f32>) -> vec3<f32> {
+  let line = d_ij * (1.0 / max(r, 1e-12));
+  let sum = facing_towards(facing_i, line) - facing_towards(facing_j, -line);
+  let size = length(sum);
+  let normal = sum * (1.0 / max(size, 1e-12));
+  if (size > 0.5 && dot(normal, line) > 0.25) {
+    return normal;
+  }
+  return line;
+}
+
+// A sheet shows the side that looks along a direction; a face has one side.
+fn facing_towards(facing: vec3<f32>, direction: vec3<f32>) -> vec3<f32> {
+  if (dot(facing, facing) < 2.0) {
+    return facing;
+  }
+  return facing * (0.5 * sign(dot(facing, direction)));
+}
+
+// Part that a particle of a face has in a contact beside it at a distance of `aside` spacings along the face. On a lattice of
+// spacing 1 the parts of all particles sum to 1 (2 % at most off), so that a face is even.
+fn contact_part(aside: f32) -> f32 {
+  let s = min(aside, 1.0);
+  return (1.0 - s) * (1.0 + 0.5 * s - s * s);
+}
+
+// E13: the tangential pull of spring and dashpot, no stronger than friction allows.
+fn friction(pull: vec3<f32>, limit: f32) -> vec3<f32> {
+  return pull * min(1.0, limit / max(length(pull), 1e-30));
+}

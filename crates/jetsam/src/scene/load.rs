@@ -1,6 +1,6 @@
 //! Reading a scene: text to [`Scene`], `--set` overrides, ranges; and the JSON schema.
 
-use super::Scene;
+use super::{Preset, Scene};
 use crate::error::{Error, Result};
 use crate::params::{self, PARAMS};
 use miette::NamedSource;
@@ -41,13 +41,21 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn parse(source: Source, overrides: &[String]) -> Result<Self> {
         let mut scene: Scene = toml::from_str(&source.text).map_err(|e| source.syntax(&e))?;
-        if !overrides.is_empty() {
+        let asks = |s: &Scene| s.solver.preset == Preset::Article;
+        if !overrides.is_empty() || asks(&scene) {
             let mut table: Table = toml::from_str(&source.text).map_err(|e| source.syntax(&e))?;
             for one in overrides {
                 set(&mut table, one).map_err(|(message, help)| source.error("", message, help))?;
             }
-            scene = Scene::deserialize_table(table)
-                .map_err(|e| source.error("", format!("--set: {}", e.message()), hint(e.message())))?;
+            let read = |table: Table| {
+                Scene::deserialize_table(table)
+                    .map_err(|e| source.error("", format!("--set: {}", e.message()), hint(e.message())))
+            };
+            scene = read(table.clone())?;
+            if asks(&scene) {
+                article(&mut table);
+                scene = read(table)?;
+            }
         }
         scene.source = source;
         scene.check_ranges()?;
@@ -161,6 +169,30 @@ impl Source {
             (value, span) = (next.get_ref(), next.span());
         }
         Some(span)
+    }
+}
+
+/// Adds the choices of the article where the scene says nothing else.
+fn article(table: &mut Table) {
+    let choose = |table: &mut Value, key: &str, value: Value| {
+        if let Value::Table(t) = table {
+            t.entry(key).or_insert(value);
+        }
+    };
+    if let Some(solver) = table.get_mut("solver") {
+        for (key, word) in [
+            ("coupling", "spring"),
+            ("damping", "full"),
+            ("surface", "spheres"),
+            ("kernel", "mueller"),
+            ("viscosity", "mueller"),
+            ("pressure_force", "mueller"),
+        ] {
+            choose(solver, key, word.into());
+        }
+    }
+    if let Some(Value::Array(rigid)) = table.get_mut("rigid") {
+        rigid.iter_mut().for_each(|body| choose(body, "friction", Value::Float(0.0)));
     }
 }
 

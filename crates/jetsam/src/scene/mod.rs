@@ -7,7 +7,9 @@ pub mod builtin;
 mod emitter;
 mod expect;
 mod flock;
+pub mod joint;
 mod load;
+pub mod motion;
 mod probe;
 pub mod solid;
 
@@ -20,6 +22,7 @@ pub use probe::{Component, End, Line, Norm, Of, Probe, Space};
 
 use crate::laws::kernel::KernelSet;
 use crate::params::default as d;
+use glam::{DQuat, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -56,6 +59,9 @@ pub struct Scene {
     /// Bodies that do not move: obstacles, terrain.
     #[serde(default, rename = "static", skip_serializing_if = "Vec::is_empty")]
     pub statics: Vec<Static>,
+    /// Joints between bodies.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joint: Vec<joint::Joint>,
     /// Sources of fluid.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub emitter: Vec<Emitter>,
@@ -180,6 +186,9 @@ pub struct Solver {
     /// XSPH (E6): how much particles are carried with their neighbours. 0 turns it off.
     #[serde(default = "d::xsph")]
     pub xsph: f64,
+    /// Values of all choices at once; what is written besides wins.
+    #[serde(default)]
+    pub preset: Preset,
     /// Shifting (Sun et al. 2017), as a multiple of theirs: inside a fluid, particles are carried from where they are
     /// dense to where they are sparse. 0 turns it off.
     #[serde(default = "d::shifting")]
@@ -200,6 +209,9 @@ pub struct Solver {
     /// Dashpot of contacts (E11).
     #[serde(default)]
     pub damping: Damping,
+    /// What the particles of bodies are to each other.
+    #[serde(default)]
+    pub surface: Surface,
     /// Contact diameter `r` of two particles of different bodies (E10).
     #[serde(default = "d::contact_diameter")]
     pub contact_diameter: f64,
@@ -221,6 +233,9 @@ pub struct Solver {
     /// `C_v` of E29: bound by viscosity.
     #[serde(default = "d::courant_viscous")]
     pub courant_viscous: f64,
+    /// How long a body lies still on others before it sleeps, and costs nothing until something touches it. 0: never.
+    #[serde(default = "d::sleep")]
+    pub sleep: f64,
     /// Before time begins, let the fluid come to rest under strong drag for this long (bodies stand still).
     #[serde(default = "d::settle")]
     pub settle: f64,
@@ -306,6 +321,29 @@ pub enum Damping {
     Normal,
     /// The full relative velocity, as in the article.
     Full,
+}
+
+/// Values of all choices at once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// The defaults.
+    #[default]
+    Default,
+    /// The laws of the article by Young and Erlebacher: springs between fluid and bodies, the full dashpot, balls without
+    /// friction, Mueller's kernels and forces.
+    Article,
+}
+
+/// What the particles of bodies are to each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Surface {
+    /// Faces are planes: contacts push along their normals.
+    #[default]
+    Smooth,
+    /// Balls, as in the article: contacts push along the line of centres, and faces are bumpy.
+    Spheres,
 }
 
 /// E20.
@@ -440,6 +478,12 @@ pub struct Rigid {
     /// Dashpot of one contact of two particles; wins over `restitution` (E14).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damping: Option<f64>,
+    /// Friction `mu` (E13); of two bodies the geometric mean counts.
+    #[serde(default = "d::rigid_friction")]
+    pub friction: f64,
+    /// Whether fluids do not move the body, though it moves them.
+    #[serde(default)]
+    pub one_way: bool,
     /// Copies in place of one body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub copies: Option<Copies>,
@@ -486,7 +530,7 @@ pub struct Region {
     pub max: [f64; 3],
 }
 
-/// A body that does not move.
+/// A body that nothing moves: it stands, or moves as told (E15).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Static {
@@ -501,6 +545,12 @@ pub struct Static {
     /// Rotation about that origin: axis x, y, z and an angle in degrees.
     #[serde(default = "no_rotation")]
     pub rotation: [f64; 4],
+    /// Friction `mu` (E13); when absent, that of the body it meets counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
+    /// How it moves.
+    #[serde(default)]
+    pub motion: motion::Motion,
 }
 
 /// A shape. In a 2D scene its section with the x-z plane counts.
@@ -546,8 +596,23 @@ pub enum Shape {
         #[serde(default = "one")]
         scale: f64,
     },
+    /// A shape less others: a cup is a cylinder less a narrower one.
+    Difference {
+        /// The shape.
+        from: std::boxed::Box<Shape>,
+        /// What is cut out of it: boxes, balls, cylinders, and differences of these.
+        cut: Vec<Shape>,
+    },
     /// The particles themselves (m).
     Points(Vec<[f64; 3]>),
+}
+
+/// Rotation from axis x, y, z and degrees.
+pub(crate) fn axis_angle([x, y, z, degrees]: [f64; 4]) -> DQuat {
+    match DVec3::new(x, y, z).try_normalize() {
+        Some(axis) => DQuat::from_axis_angle(axis, degrees.to_radians()),
+        None => DQuat::IDENTITY,
+    }
 }
 
 fn one() -> f64 {
@@ -574,6 +639,8 @@ pub enum Force {
         /// Rate at which velocities approach the wind's (1/s).
         rate: f64,
     },
+    /// Shaking of the whole scene.
+    Shake(motion::Shake),
     /// A vortex that drags.
     Vortex {
         /// A point on its axis (m).

@@ -158,6 +158,7 @@ impl Scene {
                 Ok(Solid { points, volume, center, inertia, mesh: None, warnings: vec![] })
             }
             Shape::Mesh { path, scale } => self.mesh_solid(path, *scale, key),
+            Shape::Difference { from, cut } => self.difference(from, cut, key),
             Shape::Points(points) => {
                 if points.is_empty() {
                     return Err(self.error(key, format!("`{key}` has no points"), "give at least one"));
@@ -181,6 +182,35 @@ impl Scene {
                 Ok(Solid { points, volume: n * cell, center, inertia, mesh: None, warnings: vec![] })
             }
         }
+    }
+
+    /// A shape less others. Mass properties come from the particles that are left, with the cells of the whole.
+    fn difference(&self, from: &Shape, cut: &[Shape], key: &str) -> Result<Solid> {
+        let whole = self.solid(from, &format!("{key}.difference.from"))?;
+        for (index, shape) in cut.iter().enumerate() {
+            if !shape.is_plain() {
+                let message = format!("`{key}`: a torus, a mesh or points cannot be cut out");
+                return Err(self.error(
+                    &format!("{key}.difference.cut.{index}"),
+                    message,
+                    "cut boxes, balls, cylinders, or differences of these",
+                ));
+            }
+        }
+        let flat = self.world.dimensions == 2;
+        let all = whole.points.len() as f64;
+        let left = whole.points.into_iter().filter(|&p| !cut.iter().any(|c| c.contains(p, flat)));
+        let points: Vec<[f64; 3]> = left.map(|p| p.to_array()).collect();
+        if points.is_empty() {
+            let message = format!("`{key}`: nothing is left of the shape");
+            return Err(self.error(key, message, "cut less, or choose a smaller [resolution] spacing"));
+        }
+        let share = points.len() as f64 / all;
+        let mut solid = self.solid(&Shape::Points(points), key)?;
+        let scale = whole.volume * share / solid.volume;
+        (solid.volume, solid.inertia) = (solid.volume * scale, solid.inertia * scale);
+        solid.warnings = whole.warnings;
+        Ok(solid)
     }
 
     fn mesh_solid(&self, path: &str, scale: f64, key: &str) -> Result<Solid> {
@@ -222,6 +252,37 @@ impl Scene {
             return Mesh::from_bytes(format, bytes).map_err(|e| self.error(key, e.to_string(), e.help));
         }
         Mesh::load(&self.source.folder.join(path)).map_err(|e| self.error(key, e.to_string(), e.help))
+    }
+}
+
+impl Shape {
+    /// Whether [`Shape::contains`] knows the shape.
+    fn is_plain(&self) -> bool {
+        match self {
+            Shape::Box(_) | Shape::Sphere { .. } | Shape::Cylinder { .. } => true,
+            Shape::Difference { from, cut } => from.is_plain() && cut.iter().all(Shape::is_plain),
+            Shape::Torus { .. } | Shape::Mesh { .. } | Shape::Points(_) => false,
+        }
+    }
+
+    /// Whether a point is inside; in a flat scene y does not count.
+    fn contains(&self, p: DVec3, flat: bool) -> bool {
+        match self {
+            Shape::Box(Region { min, max }) => (0..3).all(|a| (flat && a == 1) || (min[a]..=max[a]).contains(&p[a])),
+            Shape::Sphere { center, radius } => {
+                let mut d = p - DVec3::from(*center);
+                d.y = if flat { 0.0 } else { d.y };
+                d.length() < *radius
+            }
+            Shape::Cylinder { center, axis, radius, height } => {
+                let (mut d, axis) = (p - DVec3::from(*center), DVec3::from(*axis).normalize_or_zero());
+                d.y = if flat { 0.0 } else { d.y };
+                let along = d.dot(axis);
+                (flat || along.abs() < 0.5 * height) && (d - axis * along).length() < *radius
+            }
+            Shape::Difference { from, cut } => from.contains(p, flat) && !cut.iter().any(|c| c.contains(p, flat)),
+            Shape::Torus { .. } | Shape::Mesh { .. } | Shape::Points(_) => false,
+        }
     }
 }
 

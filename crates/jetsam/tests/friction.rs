@@ -1,0 +1,99 @@
+//! Friction of bodies (E13): inclines, rolling, and what friction may not do.
+
+mod common;
+
+use common::world;
+use jetsam::World;
+
+const G: f64 = 9.81;
+
+/// A plane of 30 degrees: gravity leans, the floor is level. `body` stands at height `z`, `speed` along x.
+fn incline(shape: &str, z: f64, mu: f64, speed: f64) -> World {
+    let (gx, gz) = (G * 0.5, -G * 30f64.to_radians().cos());
+    world(&format!(
+        "[world]\ngravity = [{gx}, 0, {gz}]\n[domain]\nmin = [-0.2, -0.2, 0]\nmax = [1.0, 0.2, 0.4]\n\
+         walls = [\"open\", \"open\", \"solid\"]\n[resolution]\nspacing = 0.02\n\
+         [[rigid]]\nshape = {{ {shape} }}\ndensity = 1000\nposition = [0, 0, {z}]\nfriction = {mu}\nvelocity = [{speed}, 0, 0]\n\
+         restitution = 0.1\n"
+    ))
+}
+
+const BLOCK: &str = "box = { min = [-0.06, -0.06, -0.04], max = [0.06, 0.06, 0.04] }";
+
+/// Mean acceleration along x between two times.
+fn acceleration(w: &mut World, from: f64, to: f64) -> f64 {
+    w.advance(from, |_, r| r.trouble.is_none());
+    let v = w.state().bodies.body[0].v.x;
+    w.advance(to, |_, r| r.trouble.is_none());
+    (w.state().bodies.body[0].v.x - v) / (to - from)
+}
+
+#[test]
+fn a_block_slides_down_an_incline_as_coulomb_says() {
+    // B6: a = g (sin - mu cos): 4.905 without friction, 3.2059 at 0.2, 1.0819 at 0.45
+    for (mu, expected) in [(0.0, 4.905), (0.2, 3.2059), (0.45, 1.0819)] {
+        let mut w = incline(BLOCK, 0.04, mu, 0.0);
+        let a = acceleration(&mut w, 0.1, 0.4);
+        println!("mu {mu}: {a:.4} m/s^2, {expected} expected");
+        assert!((a / expected - 1.0).abs() <= 0.02, "mu {mu}: {a} {expected}");
+    }
+}
+
+#[test]
+fn a_block_sticks_above_the_angle_of_friction() {
+    // B6: sticks for mu >= tan 30 degrees = 0.57735; creep at most 1e-4 m/s
+    let mut w = incline(BLOCK, 0.04, 0.6, 0.0);
+    w.advance(0.5, |_, r| r.trouble.is_none());
+    let x = w.state().bodies.body[0].x.x;
+    w.advance(1.5, |_, r| r.trouble.is_none());
+    let creep = (w.state().bodies.body[0].x.x - x) / 1.0;
+    println!("creep {creep:.2e} m/s");
+    assert!(creep.abs() <= 1e-4, "{creep}");
+}
+
+/// A ball of particles on a sphere, radius 8 spacings to their rims.
+fn ball() -> String {
+    let (n, radius) = (1200, 0.15);
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let points: Vec<String> = (0..n)
+        .map(|k| {
+            let z = 1.0 - 2.0 * (f64::from(k) + 0.5) / f64::from(n);
+            let (r, a) = ((1.0 - z * z).sqrt() * radius, golden * f64::from(k));
+            format!("[{:.6}, {:.6}, {:.6}]", r * a.cos(), r * a.sin(), z * radius)
+        })
+        .collect();
+    format!("points = [{}]", points.join(", "))
+}
+
+#[test]
+fn a_ball_rolls_without_slipping() {
+    // a thin shell of radius R = 0.15 + dx / 2 rolls: a = g sin / (1 + I / (m R^2)); within 10 % for its bumps, on which it
+    // rolls like a polygon: its rim is 3 % at most slower than the ground
+    let mut w = incline(&ball(), 0.16, 0.6, 0.0);
+    let b = &w.state().bodies.body[0];
+    let inertia = 1.0 / b.inverse_inertia.y_axis.y;
+    let radius = 0.16;
+    let expected = G * 0.5 / (1.0 + inertia / (b.mass * radius * radius));
+    let a = acceleration(&mut w, 0.1, 0.5);
+    let b = &w.state().bodies.body[0];
+    let slip = 1.0 - b.omega.y * radius / b.v.x;
+    println!("rolls with {a:.4} m/s^2, {expected:.4} expected; slip {slip:.4}");
+    assert!((a / expected - 1.0).abs() <= 0.1, "{a} {expected}");
+    assert!(slip.abs() < 0.03, "slips by {slip}");
+}
+
+#[test]
+fn the_articles_preset_has_no_friction_and_creeps() {
+    // seed law: the full dashpot alone holds a block back: it reaches v = m g sin / (n eta) and never sticks
+    let text = "[world]\ngravity = [4.905, 0, -8.4957]\n[domain]\nmin = [-0.2, -0.2, 0]\nmax = [1.0, 0.2, 0.4]\n\
+         walls = [\"open\", \"open\", \"solid\"]\n[resolution]\nspacing = 0.02\n[solver]\npreset = \"article\"\n\
+         [[rigid]]\nshape = { points = [[0, 0, 0]] }\nmass = 1.0\nposition = [0.01, 0.01, 0.01]\nstiffness = 1e5\ndamping = 50\n";
+    let scene = common::scene(text);
+    assert_eq!(scene.rigid[0].friction, 0.0);
+    assert_eq!(scene.solver.damping, jetsam::scene::Damping::Full);
+    assert_eq!(scene.solver.surface, jetsam::scene::Surface::Spheres);
+    assert_eq!(scene.solver.coupling, jetsam::scene::Coupling::Spring);
+    // what the scene says wins
+    let other = common::scene(&text.replace("preset = \"article\"", "preset = \"article\"\ndamping = \"normal\""));
+    assert_eq!(other.solver.damping, jetsam::scene::Damping::Normal);
+}
