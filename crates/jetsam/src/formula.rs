@@ -58,8 +58,8 @@ enum Op {
     Multiply,
     Divide,
     Power,
-    One(fn(f64) -> f64),
-    Two(fn(f64, f64) -> f64),
+    One(One),
+    Two(Two),
     If,
 }
 
@@ -69,8 +69,11 @@ pub struct Expression {
     code: Vec<Op>,
 }
 
+type One = fn(f64) -> f64;
+type Two = fn(f64, f64) -> f64;
+
 /// Functions of one argument.
-const ONE: &[(&str, fn(f64) -> f64)] = &[
+const ONE: &[(&str, One)] = &[
     ("sin", f64::sin),
     ("cos", f64::cos),
     ("tan", f64::tan),
@@ -91,8 +94,7 @@ const ONE: &[(&str, fn(f64) -> f64)] = &[
 ];
 
 /// Functions of two arguments.
-const TWO: &[(&str, fn(f64, f64) -> f64)] =
-    &[("min", f64::min), ("max", f64::max), ("mod", f64::rem_euclid), ("atan2", f64::atan2)];
+const TWO: &[(&str, Two)] = &[("min", f64::min), ("max", f64::max), ("mod", f64::rem_euclid), ("atan2", f64::atan2)];
 
 fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }

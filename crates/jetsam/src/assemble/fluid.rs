@@ -43,6 +43,7 @@ impl Scene {
         let gravity = DVec3::from(self.world.gravity);
         let spacing = self.resolution.spacing;
         let mut fluid: Vec<Drop> = Vec::new();
+        let starts = self.starts()?;
         let (mut carved, mut outside) = (0, 0);
         for (index, f) in self.fluid.iter().enumerate() {
             let key = format!("fluid.{index}.shape");
@@ -51,6 +52,7 @@ impl Scene {
             warnings.extend(solid.warnings.iter().cloned());
             let before = fluid.len();
             for p in solid.points {
+                let p = starts.displaced(self, index, p, &grid)?;
                 let within = (0..3)
                     .all(|a| self.world.dimensions == 2 && a == 1 || (p[a] >= grid.min[a] && p[a] <= grid.max[a]));
                 if !within {
@@ -76,15 +78,12 @@ impl Scene {
             warnings.push(format!("{outside} fluid particles outside the domain were left out"));
         }
 
+        starts.jitter(self, &mut fluid, &grid);
         let sources = self.sources()?;
-        let starts = self.starts()?;
         starts.set_velocities(self, &mut fluid)?;
         let largest_speed = self.largest_speed(&fluid, bodies, &sources, gravity, &grid);
         let sound_speed = self.solver.sound_speed.unwrap_or(10.0 * largest_speed);
         self.squeeze(&mut fluid, gravity, sound_speed);
-        if starts.displace(self, &mut fluid, &grid)? {
-            starts.set_velocities(self, &mut fluid)?;
-        }
         let cohesion = cohesion_moment(support, self.world.dimensions);
         let curvature = curvature_moment(self.solver.kernel.force(), support, self.world.dimensions);
         let fluids: Vec<FluidModel> = self

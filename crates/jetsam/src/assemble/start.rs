@@ -41,35 +41,35 @@ impl Starts {
         for drop in fluid {
             drop.v = at(&self.0[drop.fluid as usize].velocity, drop.x, scene);
             if !drop.v.is_finite() {
-                return Err(not_finite(scene, drop, "velocity"));
+                return Err(not_finite(scene, drop.fluid as usize, drop.x, "velocity"));
             }
         }
         Ok(())
     }
 
-    /// Moves particles as the scene asks for; whether any did.
-    pub(super) fn displace(&self, scene: &Scene, fluid: &mut [Drop], grid: &Grid) -> Result<bool> {
-        let mut moved = false;
+    /// Where a particle of a fluid goes from its place on the lattice.
+    pub(super) fn displaced(&self, scene: &Scene, fluid: usize, x: DVec3, grid: &Grid) -> Result<DVec3> {
+        let Some(formulas) = &self.0[fluid].displace else { return Ok(x) };
+        let mut to = x + at(formulas, x, scene);
+        if !to.is_finite() {
+            return Err(not_finite(scene, fluid, x, "displace"));
+        }
+        wrap(&mut to, grid);
+        Ok(to)
+    }
+
+    /// Moves particles at random as far as the scene asks for: by less than the way to a wall.
+    pub(super) fn jitter(&self, scene: &Scene, fluid: &mut [Drop], grid: &Grid) {
+        let flat = if scene.world.dimensions == 2 { 0.0 } else { 1.0 };
         for (index, drop) in fluid.iter_mut().enumerate() {
-            let f = &scene.fluid[drop.fluid as usize];
-            let before = drop.x;
-            if let Some(formulas) = &self.0[drop.fluid as usize].displace {
-                drop.x += at(formulas, before, scene);
-            }
-            if f.jitter > 0.0 {
+            let jitter = scene.fluid[drop.fluid as usize].jitter;
+            if jitter > 0.0 {
                 let stream = JITTER + u64::from(drop.fluid);
                 let draw = |a: u64| 2.0 * random::uniform(scene.world.seed, stream, 3 * index as u64 + a) - 1.0;
-                let flat = if scene.world.dimensions == 2 { 0.0 } else { 1.0 };
-                let random = DVec3::new(draw(0), flat * draw(1), draw(2));
-                drop.x += f.jitter * scene.resolution.spacing * random;
+                drop.x += jitter * scene.resolution.spacing * DVec3::new(draw(0), flat * draw(1), draw(2));
+                wrap(&mut drop.x, grid);
             }
-            moved |= drop.x != before;
-            if !drop.x.is_finite() {
-                return Err(not_finite(scene, drop, "displace"));
-            }
-            keep_inside(scene, drop, grid)?;
         }
-        Ok(moved)
     }
 }
 
@@ -79,23 +79,15 @@ fn at(formulas: &[Expression; 3], x: DVec3, scene: &Scene) -> DVec3 {
     DVec3::new(value(0), if scene.world.dimensions == 2 { 0.0 } else { value(1) }, value(2))
 }
 
-fn keep_inside(scene: &Scene, drop: &mut Drop, grid: &Grid) -> Result<()> {
-    for a in (0..3).filter(|&a| !(scene.world.dimensions == 2 && a == 1)) {
-        let (min, max) = (grid.min[a], grid.max[a]);
-        if grid.walls[a] == Wall::Periodic {
-            drop.x[a] = min + (drop.x[a] - min).rem_euclid(max - min);
-        } else if drop.x[a] < min || drop.x[a] > max {
-            let name = ["x", "y", "z"][a];
-            let message = format!("a particle is displaced to {name} = {:.4} m, outside the domain", drop.x[a]);
-            let path = format!("fluid.{}.displace", drop.fluid);
-            return Err(scene.error(&path, message, "displace it less, or enlarge the domain"));
-        }
+/// Brings a place on periodic axes back into the domain.
+fn wrap(x: &mut DVec3, grid: &Grid) {
+    for a in (0..3).filter(|&a| grid.walls[a] == Wall::Periodic) {
+        x[a] = grid.min[a] + (x[a] - grid.min[a]).rem_euclid(grid.max[a] - grid.min[a]);
     }
-    Ok(())
 }
 
-fn not_finite(scene: &Scene, drop: &Drop, key: &str) -> Box<crate::Error> {
-    let path = format!("fluid.{}.{key}", drop.fluid);
-    let message = format!("`{path}` is not finite at {:?}", drop.x.to_array());
+fn not_finite(scene: &Scene, fluid: usize, x: DVec3, key: &str) -> Box<crate::Error> {
+    let path = format!("fluid.{fluid}.{key}");
+    let message = format!("`{path}` is not finite at {:?}", x.to_array());
     scene.error(&path, message, "look for a division by zero, a root or logarithm of a negative number")
 }
