@@ -119,7 +119,7 @@ fn run_writes_what_the_contract_says() {
     let last = &lines[3];
     let dt = 0.02 / last["steps"].as_f64().unwrap();
     assert!((last["dt"].as_f64().unwrap() / dt - 1.0).abs() < 1e-9);
-    assert_eq!(last["stage_ms"].as_object().unwrap().len(), 9);
+    assert_eq!(last["stage_ms"].as_object().unwrap().len(), 10);
 
     let bodies = std::fs::read_to_string(out.join("bodies.csv")).unwrap();
     let mut rows = bodies.lines();

@@ -29,7 +29,7 @@
 //! | pressure | equation of state (E3) | [`interact::pressure`] |
 //! | boundary | what fluids show to bodies and walls (E17) | [`interact::boundary`] |
 //! | forces | all pairs (E4-E6, E10-E12, E16, E30) | [`interact::forces`] |
-//! | agents | flocks move, decide and push (E22-E28) | [`mod@flock`] |
+//! | agents | flocks move and decide (E22-E26) | [`mod@flock`] |
 //! | bodies | force and torque of each body (E18) | [`integrate::bodies`] |
 //! | kick | the second half of the kick (E20) | [`integrate`] |
 //! | ledger | momentum, energy, what was lost, what bounds the next step | [`ledger`] |

@@ -271,8 +271,6 @@ pub struct Agents {
     pub id: Vec<u32>,
     /// What was decided: steering (m/s^2) of Reynolds' agents, else the velocity to come (m/s). Written by agents.
     pub next: Vec<[f32; 3]>,
-    /// Force of fluids and bodies on the agent (N): E27, E28. Written by agents.
-    pub force: Vec<[f32; 3]>,
     /// Time of each flock. Written by agents.
     pub clock: Vec<Clock>,
 }

@@ -318,3 +318,48 @@ fn couzin_swarms_mill_and_fly_parallel() {
         assert!(m.is_none_or(|m: f64| (got_m - m).abs() < 0.05), "{orientation}: m = {got_m}");
     }
 }
+
+/// Shapes of obstacles in a box of four metres: centre, and half extents of a box or the radius of a ball.
+const BOX: ([f32; 3], [f32; 3]) = ([1.5, 2.0, 1.0], [0.3, 0.4, 1.0]);
+const BALL: ([f32; 3], f32) = ([2.8, 2.2, 2.0], 0.5);
+
+/// Flies a thousand agents among obstacles; returns the deepest place inside any of them (m), and how many passed a side.
+fn among_obstacles(steps: u32) -> (f32, usize) {
+    let (b, h) = BOX;
+    let (low, high): ([f32; 3], [f32; 3]) =
+        (std::array::from_fn(|a| b[a] - h[a]), std::array::from_fn(|a| b[a] + h[a]));
+    let mut w = world(&format!(
+        "[domain]\nmin = [0, 0, 0]\nmax = [4, 4, 4]\n[resolution]\nspacing = 0.1\n\
+         [[static]]\nshape = {{ box = {{ min = {low:?}, max = {high:?} }} }}\n\
+         [[static]]\nshape = {{ sphere = {{ center = {:?}, radius = {} }} }}\n\
+         [[flock]]\ncount = 1000\nshape = {{ box = {{ min = [0, 0, 0], max = [4, 4, 4] }} }}\nradius = 0.5\nspeed = 1\nwander = 0.5\n",
+        BALL.0, BALL.1
+    ));
+    let (mut deepest, mut outside) = (f32::MIN, 0);
+    for _ in 0..steps {
+        let step = w.step(f64::INFINITY);
+        assert!(step.dt * 1.5 < 0.25 * 0.5, "a step carries agents farther than a quarter of their radius");
+        for r in &w.state().agents.record {
+            let d: [f32; 3] = std::array::from_fn(|a| h[a] - (r.x[a] - b[a]).abs());
+            deepest = deepest.max(d[0].min(d[1]).min(d[2]));
+            deepest = deepest.max(BALL.1 - x(r).distance(Vec3::from(BALL.0)));
+            outside += usize::from(!r.x.iter().all(|c| (0.0..=4.0).contains(c)));
+        }
+    }
+    (deepest, outside)
+}
+
+#[test]
+fn agents_enter_no_obstacle() {
+    let (deepest, outside) = among_obstacles(300);
+    println!("nearest to a surface: {:.4} m", -deepest);
+    assert!(deepest < 0.0 && outside == 0, "{deepest} m deep, {outside} outside");
+}
+
+#[test]
+#[ignore = "a minute: 10,000 steps"]
+fn agents_enter_no_obstacle_for_long() {
+    let (deepest, outside) = among_obstacles(10_000);
+    println!("nearest to a surface: {:.4} m", -deepest);
+    assert!(deepest < 0.0 && outside == 0, "{deepest} m deep, {outside} outside");
+}

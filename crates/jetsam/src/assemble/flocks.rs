@@ -45,11 +45,11 @@ impl Scene {
                 })?),
             };
             self.check_flock(flock, &key)?;
-            let (dimensions, seed) = (self.world.dimensions, self.world.seed);
-            all.push(FlockConstants::new(flock, index, first, relations, leader, dimensions, seed));
+            all.push(FlockConstants::new(flock, index, first, relations, leader, self.world.seed));
             first += flock.count as usize;
         }
-        let reach = all.iter().map(|f| f64::from(f.reach())).fold(0.0, f64::max);
+        let reaches = all.iter().flat_map(|f| (0..all.len()).map(|j| f64::from(f.reach(j))));
+        let reach = reaches.fold(0.0, f64::max);
         for a in (0..3).filter(|&a| self.domain.walls[a] == Wall::Periodic) {
             let length = self.domain.max[a] - self.domain.min[a];
             if length < 2.0 * reach && !(self.world.dimensions == 2 && a == 1) {
@@ -96,7 +96,6 @@ impl Scene {
         for (field, given) in [
             ("goal", flock.goal.is_some()),
             ("leader", flock.leader.is_some()),
-            ("mass", flock.mass.is_some()),
             ("speed_min", flock.speed_min.is_some()),
             ("speed_max", flock.speed_max.is_some()),
             ("acceleration", flock.acceleration.is_some()),
@@ -126,10 +125,6 @@ impl Scene {
         if flock.speed_min.unwrap_or(0.5 * flock.speed) > flock.speed_max.unwrap_or(1.5 * flock.speed) {
             let message = format!("`{key}`: the smallest speed is above the largest");
             return Err(self.error(&format!("{key}.speed_min"), message, "make speed_min at most speed_max"));
-        }
-        if flock.drag > 0.0 && (flock.mass.is_none() || flock.size == 0.0) {
-            let message = format!("`{key}.drag` needs the size and the mass of an agent");
-            return Err(self.error(&format!("{key}.drag"), message, "add size = ... (m) and mass = ... (kg)"));
         }
         Ok(())
     }
@@ -163,9 +158,7 @@ impl Scene {
                 agents.next.push(if constants.model == FlockModel::Reynolds { [0.0; 3] } else { v });
             }
         }
-        let n = agents.record.len();
-        agents.id = (0..n as u32).collect();
-        agents.force = vec![[0.0; 3]; n];
+        agents.id = (0..agents.record.len() as u32).collect();
         Ok(agents)
     }
 

@@ -27,6 +27,8 @@ pub struct View<'a> {
     pub world: &'a World<'a>,
     /// Cells of agents.
     pub grid: &'a Grid,
+    /// Width of a cell, the smallest of its sides (m).
+    pub width: f32,
     /// Where they begin, flock by flock.
     pub cells: &'a [Cells],
     /// All agents.
@@ -87,7 +89,8 @@ pub fn chunk<S: Simd>(
         for (j, other) in flocks.iter().enumerate() {
             let metric = rule.neighbours == 0 || rule.relations[j] != Relation::School;
             if rule.relations[j] != Relation::Ignore && metric {
-                scratch.tiles[j].pack(simd, view.grid, &view.cells[j], other.first, view.sorted, cell);
+                let far = (rule.reach(j) / view.width).ceil() as i32;
+                scratch.tiles[j].pack(simd, view.grid, &view.cells[j], other.first, view.sorted, cell, far);
             }
         }
         for i in from..to {
@@ -117,6 +120,7 @@ fn perceive<S: Simd>(simd: S, scratch: &mut Scratch, view: View, own: usize, i: 
     if rule.neighbours > 0 {
         pick_nearest(simd, view, own, i, scratch);
         sums::school(simd, me, rule, &scratch.tiles[own], true, &mut total);
+        total.add_oneself(me);
     }
     total
 }
@@ -160,11 +164,11 @@ fn steer(view: View, own: usize, i: usize, sums: &Sums) -> Vec3 {
     let me = &view.records[i];
     let (w, v, u) = (&rule.weights, me.v, &rule.limits);
     let mut a = w.separation * sums.repelled;
-    // the mean of those seen and oneself
-    let mean = (sums.velocity + Vec3::from(v)) / (sums.aligned + 1.0);
+    let mean = sums.velocity / sums.aligned;
     a += vec3!(flock::alignment(v, mean.to_array(), w.alignment));
-    if sums.drawn > 0.0 {
-        a += vec3!(flock::cohesion((sums.place / sums.drawn).to_array(), w.cohesion));
+    // oneself is no place to be drawn to
+    if sums.drawn > 1.0 {
+        a += vec3!(flock::cohesion((sums.place / (sums.drawn - 1.0)).to_array(), w.cohesion));
     }
     a += vec3!(flock::cruise(v, u.speed, w.cruise));
     if let Some((goal, slow)) = rule.goal {
@@ -326,9 +330,8 @@ fn zones(view: View, rule: &FlockConstants, own: usize, i: usize, sums: &Sums) -
 
 /// E24.
 fn noisy_mean(view: View, rule: &FlockConstants, own: usize, i: usize, sums: &Sums) -> Vec3 {
-    let v = Vec3::from(view.records[i].v);
-    let heading = v.normalize_or_zero();
-    let mean = (sums.velocity + v).try_normalize().unwrap_or(heading);
+    let heading = Vec3::from(view.records[i].v).normalize_or_zero();
+    let mean = sums.velocity.try_normalize().unwrap_or(heading);
     let count = counter(view.id[i], view.clock[own].decisions);
     let angle = rule.noise * (uniform(rule.seed, SWING, count) - 0.5);
     let wanted = swung(view, rule, mean, angle, count);

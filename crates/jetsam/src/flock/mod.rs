@@ -1,7 +1,6 @@
-//! Flocks (E22-E28): agents that perceive each other, steer, and meet fluids and bodies.
+//! Flocks (E22-E26): agents that perceive each other, steer, and keep clear of fluids and bodies.
 //!
-//! In: the state's [`Agents`](crate::state::Agents), and the particles for what is met. Out: agents moved and decided anew, and the
-//! forces they exert. [`Crowd::run`] is the stage `agents`; [`crate::backend::Cpu`] calls it between the particles' forces and their
+//! In: the state's [`Agents`](crate::state::Agents), and the particles for what is met. Out: agents moved and decided anew. [`Crowd::run`] is the stage `agents`; [`crate::backend::Cpu`] calls it between the particles' forces and their
 //! sum over bodies.
 //!
 //! | file | what it does |
@@ -13,7 +12,6 @@
 //! | nearest | topological neighbours (E25) |
 //! | decide | what an agent does about it: steering or a new direction (E22-E24, E26) |
 //! | obstacles | bodies ahead, and bodies touched |
-//! | coupling | drag in fluids and contact with bodies, both ways (E27, E28) |
 //! | order | polarization, milling, fragments |
 //!
 //! Agents decide every `tau` and move every step: a step ends where a decision is due. Reynolds' agents decide every step.

@@ -52,10 +52,6 @@ pub struct FlockConstants {
     pub tau: f64,
     /// Radius of an agent (m).
     pub size: f32,
-    /// Mass of an agent (kg); 0 when it meets neither fluids nor bodies.
-    pub mass: f32,
-    /// `C_d A / 2` (m^2).
-    pub half_area: f32,
     /// Seed of its random numbers.
     pub seed: u64,
 }
@@ -114,7 +110,6 @@ impl FlockConstants {
         first: usize,
         relations: Vec<Relation>,
         leader: Option<usize>,
-        dimensions: u32,
         seed: u64,
     ) -> Self {
         let f = flock;
@@ -130,7 +125,6 @@ impl FlockConstants {
         let radius = if f.model == FlockModel::Vicsek { radii[1] } else { radii.into_iter().fold(0.0, f32::max) };
         let half = (0.5 * f.field_of_view).to_radians().cos();
         let constant = f.model != FlockModel::Reynolds;
-        let cross_section = if dimensions == 2 { 2.0 * f.size } else { std::f64::consts::PI * f.size * f.size };
         let is_flee = |key: &str| f.meets.get(key) == Some(&Relation::Flee);
         Self {
             name: name(flock),
@@ -178,8 +172,6 @@ impl FlockConstants {
                 FlockModel::Vicsek => 1.0,
             }),
             size: f.size as f32,
-            mass: f.mass.unwrap_or(0.0) as f32,
-            half_area: (0.5 * f.drag * cross_section) as f32,
             seed: crate::random::word(seed, STREAM, index as u64),
         }
     }
@@ -194,11 +186,13 @@ impl FlockConstants {
         (self.size + 0.5 * spacing).max(1.25 * spacing)
     }
 
-    /// How far away a neighbour can be that matters (m), of whatever flock. Topological neighbours have no such bound.
-    pub fn reach(&self) -> f32 {
-        let meets = |r| self.relations.contains(&r);
-        let school = if self.neighbours == 0 { self.radius } else { 0.0 };
-        if meets(Relation::Flee) || meets(Relation::Chase) { school.max(self.sight) } else { school }
+    /// How far away an agent of flock `other` can be that matters (m). Topological neighbours have no such bound.
+    pub fn reach(&self, other: usize) -> f32 {
+        match self.relations[other] {
+            Relation::School if self.neighbours == 0 => self.radius,
+            Relation::Flee | Relation::Chase => self.sight,
+            Relation::School | Relation::Ignore => 0.0,
+        }
     }
 
     /// Largest step for which steering is smooth (s): a quarter of the smallest radius.

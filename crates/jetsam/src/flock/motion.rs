@@ -1,4 +1,4 @@
-//! Agents move: steering and forces become velocity, velocity becomes place; sides of the domain and bodies hold.
+//! Agents move: steering becomes velocity, velocity becomes place; sides of the domain and bodies hold.
 //!
 //! Reynolds' agents are kicked first and carried by the new velocity; Couzin's take the decided velocity at once; Vicsek's keep the old
 //! one until the next decision, as their law has it.
@@ -18,19 +18,12 @@ pub fn turn(angle: f64) -> (f32, f32) {
 }
 
 /// Moves a chunk of agents of one flock by `dt` (s).
-pub fn chunk(
-    world: &World,
-    rule: &FlockConstants,
-    dt: f64,
-    records: &mut [Record],
-    next: &mut [[f32; 3]],
-    force: &[[f32; 3]],
-) {
+pub fn chunk(world: &World, rule: &FlockConstants, dt: f64, records: &mut [Record], next: &mut [[f32; 3]]) {
     let turn = turn(rule.limits.turn * dt);
     let obstacles = world.has_bodies();
-    for ((r, next), force) in records.iter_mut().zip(next).zip(force) {
+    for (r, next) in records.iter_mut().zip(next) {
         match rule.model {
-            FlockModel::Reynolds => r.v = kicked(rule, r, *next, *force, dt as f32, turn),
+            FlockModel::Reynolds => r.v = kicked(rule, r, *next, dt as f32, turn),
             FlockModel::Couzin => r.v = *next,
             FlockModel::Vicsek => {}
         }
@@ -56,18 +49,9 @@ pub fn chunk(
 }
 
 /// Velocity after a step of Reynolds' agents.
-fn kicked(
-    rule: &FlockConstants,
-    r: &Record,
-    steering: [f32; 3],
-    force: [f32; 3],
-    dt: f32,
-    turn: (f32, f32),
-) -> [f32; 3] {
-    let inverse_mass = if rule.mass > 0.0 { 1.0 / rule.mass } else { 0.0 };
-    let a: [f32; 3] = std::array::from_fn(|c| steering[c] + force[c] * inverse_mass);
+fn kicked(rule: &FlockConstants, r: &Record, steering: [f32; 3], dt: f32, turn: (f32, f32)) -> [f32; 3] {
     let heading = Vec3::from(r.v).normalize_or_zero().to_array();
-    let v = flock::moved(r.v, a, dt, heading, turn.0, turn.1, rule.limits.slowest, rule.limits.fastest);
+    let v = flock::moved(r.v, steering, dt, heading, turn.0, turn.1, rule.limits.slowest, rule.limits.fastest);
     [v.x, v.y, v.z]
 }
 

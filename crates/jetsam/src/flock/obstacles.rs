@@ -113,8 +113,7 @@ fn deepest(world: &World, rule: &FlockConstants, x: [f32; 3]) -> Option<Vec3> {
     let clear = rule.clearance(world.model.spacing as f32);
     let mut most = (0.0, Vec3::ZERO);
     for kind in [Kind::Rigid, Kind::Static] {
-        // springs hold off moving bodies (E28); what they do not is held at less
-        let radius = if kind == Kind::Rigid && rule.mass > 0.0 { 0.6 * clear } else { clear };
+        let radius = clear;
         each_near(world, kind, x, 0.999 * radius, |_, d| {
             let r = d.length();
             if radius - r > most.0 {

@@ -167,7 +167,8 @@ impl Tile {
         self.end();
     }
 
-    /// Packs the agents of a flock (its cells, its first agent) in the 27 cells around `cell`; periodic images are shifted into place.
+    /// Packs the agents of a flock (its cells, its first agent) in the cells up to `far` cells from `cell`; periodic images are shifted
+    /// into place.
     #[inline(always)]
     pub fn pack<S: Simd>(
         &mut self,
@@ -177,23 +178,32 @@ impl Tile {
         first: usize,
         sorted: &Sorted,
         cell: [i32; 3],
+        far: i32,
     ) {
         self.begin();
-        let reach = |a: usize| if grid.cells[a] == 1 && grid.period[a] == 0.0 { 0..=0 } else { -1..=1 };
-        let (low, high, last) = (cell[0] - 1, cell[0] + 1, grid.cells[0] - 1);
-        for dz in reach(2) {
-            let Some((z, shift_z)) = image(grid, 2, cell[2] + dz) else { continue };
-            for dy in reach(1) {
-                let Some((y, shift_y)) = image(grid, 1, cell[1] + dy) else { continue };
+        let reach = |a: usize| match grid.period[a] > 0.0 {
+            true => cell[a] - far..=cell[a] + far,
+            false => (cell[a] - far).max(0)..=(cell[a] + far).min(grid.cells[a] - 1),
+        };
+        let (low, high, last) = (cell[0] - far, cell[0] + far, grid.cells[0] - 1);
+        for cz in reach(2) {
+            let Some((z, shift_z)) = image(grid, 2, cz) else { continue };
+            for cy in reach(1) {
+                let Some((y, shift_y)) = image(grid, 1, cy) else { continue };
                 let place = |r: Range<usize>| first + r.start..first + r.end;
                 let shift = [0.0, shift_y, shift_z];
                 self.append(simd, sorted, place(cells.row(low.max(0), high.min(last), y, z)), shift);
                 let period = grid.period[0];
                 if period > 0.0 && low < 0 {
-                    self.append(simd, sorted, place(cells.row(last, last, y, z)), [-period, shift_y, shift_z]);
+                    self.append(
+                        simd,
+                        sorted,
+                        place(cells.row(low + last + 1, last, y, z)),
+                        [-period, shift_y, shift_z],
+                    );
                 }
                 if period > 0.0 && high > last {
-                    self.append(simd, sorted, place(cells.row(0, 0, y, z)), [period, shift_y, shift_z]);
+                    self.append(simd, sorted, place(cells.row(0, high - last - 1, y, z)), [period, shift_y, shift_z]);
                 }
             }
         }

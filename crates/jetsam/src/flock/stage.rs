@@ -1,4 +1,4 @@
-//! The stage `agents`: agents move, are sorted, decide, and exert forces.
+//! The stage `agents`: agents move, are sorted, and decide.
 
 use super::decide::{self, View, with_scratch};
 use super::model::FlockConstants;
@@ -70,7 +70,7 @@ pub struct Crowd {
 const SOON: f64 = 1e-6;
 
 impl Crowd {
-    /// The stage, but for the forces agents exert. A step of length 0 decides only, as a run begins with it.
+    /// The stage. A step of length 0 decides only, as a run begins with it.
     pub fn run(&mut self, level: Level, world: &World, agents: &mut Agents, advance: Advance) {
         let flocks = &world.model.flocks;
         if flocks.is_empty() || advance.drag > 0.0 {
@@ -129,6 +129,7 @@ impl Crowd {
         let view = View {
             world,
             grid,
+            width: narrowest(grid),
             cells: &self.cells,
             sorted: &self.sorted,
             records: &agents.record,
@@ -148,10 +149,10 @@ impl Crowd {
         }
     }
 
-    /// Width of the cells (m): as far as anyone perceives; for topological neighbours, so that some cells hold about as many.
+    /// Width of the cells (m): as far as those of the largest flock perceive each other. For topological neighbours, two a cell.
     fn width(&self, model: &Model, agents: &Agents) -> f64 {
-        let reach = model.flocks.iter().map(|f| f64::from(f.reach())).fold(0.0, f64::max);
-        let mut width = 1.0001 * reach;
+        let largest = model.flocks.iter().max_by_key(|f| f.count);
+        let mut width = largest.filter(|f| f.neighbours == 0).map_or(0.0, |f| 1.0001 * f64::from(f.radius));
         if width == 0.0 {
             let mut extent = [f32::INFINITY, f32::NEG_INFINITY];
             for r in &agents.record {
@@ -166,15 +167,20 @@ impl Crowd {
     }
 }
 
+/// The smallest side of a cell (m).
+fn narrowest(grid: &Grid) -> f32 {
+    // a rounding error may put an agent into the next cell
+    grid.inverse.iter().filter(|i| **i > 0.0).map(|i| 0.99995 / i).fold(f32::INFINITY, f32::min)
+}
+
 /// Moves all agents.
 fn travel(world: &World, agents: &mut Agents, dt: f64) {
     for (flock, clock) in world.model.flocks.iter().zip(&mut agents.clock) {
         let range = flock.range();
         agents.record[range.clone()]
             .par_chunks_mut(CHUNK)
-            .zip(agents.next[range.clone()].par_chunks_mut(CHUNK))
-            .zip(agents.force[range].par_chunks(CHUNK))
-            .for_each(|((records, next), force)| motion::chunk(world, flock, dt, records, next, force));
+            .zip(agents.next[range].par_chunks_mut(CHUNK))
+            .for_each(|(records, next)| motion::chunk(world, flock, dt, records, next));
         clock.time += dt;
         clock.wait -= dt;
     }

@@ -17,18 +17,27 @@ use glam::Vec3;
 pub struct Sums {
     /// Away from those too near: pushes (Reynolds), unit vectors (Couzin).
     pub repelled: Vec3,
-    /// Velocities (m/s) of those aligned with, and their number.
+    /// Velocities (m/s) of those aligned with, oneself included.
     pub velocity: Vec3,
-    /// Number of those aligned with.
+    /// Number of those aligned with, oneself included.
     pub aligned: f32,
-    /// Relative places (m) of those drawn to (Couzin: unit vectors), and their number.
+    /// Relative places (m) of those drawn to; Couzin: unit vectors.
     pub place: Vec3,
-    /// Number of those drawn to.
+    /// Number of those drawn to, oneself included.
     pub drawn: f32,
     /// `d / r^2` (1/m) of those fled.
     pub fled: Vec3,
     /// `d / r^2` (1/m) of those chased.
     pub chased: Vec3,
+}
+
+impl Sums {
+    /// Adds what the agent itself brings, where it was not among the candidates.
+    pub fn add_oneself(&mut self, me: &Record) {
+        self.velocity += Vec3::from(me.v);
+        self.aligned += 1.0;
+        self.drawn += 1.0;
+    }
 }
 
 /// The same, lane by lane.
@@ -114,16 +123,21 @@ fn square(radius: f32, unbounded: bool) -> f32 {
 #[inline(always)]
 fn reynolds<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
     let near_sq = rule.separation_radius * rule.separation_radius;
-    let (near_limit, zero) = (f32x16::splat(simd, near_sq), f32x16::splat(simd, 0.0));
+    let near_limit = f32x16::splat(simd, near_sq);
     let align_sq = square(rule.alignment_radius, unbounded);
     let draw_sq = square(rule.cohesion_radius, unbounded);
     for b in 0..tile.blocks() {
         let block = tile.block(b);
         let (d, r_sq) = apart(me, &block);
-        let (mut aligned, mut drawn) = ([0.0; LANES], [0.0; LANES]);
+        let mut aligned = [0.0; LANES];
         for l in 0..LANES {
             aligned[l] = flock::within(r_sq[l], align_sq);
-            drawn[l] = flock::within(r_sq[l], draw_sq);
+        }
+        let mut drawn = aligned;
+        if align_sq != draw_sq {
+            for l in 0..LANES {
+                drawn[l] = flock::within(r_sq[l], draw_sq);
+            }
         }
         let mut seen = [1.0; LANES];
         if let Some(bound) = rule.view {
@@ -140,8 +154,7 @@ fn reynolds<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, u
             wide.drawn[l] += drawn[l];
         }
         // few are near: most vectors are spared the division
-        let wide_r = f32x16::load_array_ref(simd, &r_sq);
-        if (wide_r.simd_lt(near_limit) & wide_r.simd_gt(zero)).any_true() {
+        if f32x16::load_array_ref(simd, &r_sq).simd_lt(near_limit).any_true() {
             let mut push = [0.0; LANES];
             for l in 0..LANES {
                 let weight = flock::separation(r_sq[l], rule.separation_radius) * flock::within(r_sq[l], near_sq);

@@ -1,16 +1,16 @@
-// E22-E27: flocks. d = x_j - x_i from the agent that perceives to the one perceived; v_i, v_j velocities.
+// E22-E26: flocks. d = x_j - x_i from the agent that perceives to the one perceived; v_i, v_j velocities.
 // Weights are pure numbers; the caller brings a speed U and a radius R, and T = R / U makes rates of them.
 
 fn unit(v: vec3<f32>) -> vec3<f32> {
   return v / max(length(v), 1e-30);
 }
 
-// 1 inside a radius, the agent itself (r = 0) not counted, else 0.
+// 1 inside a radius, else 0. The agent itself is inside.
 fn within(r_sq: f32, radius_sq: f32) -> f32 {
-  return select(0.0, 1.0, r_sq < radius_sq && r_sq > 0.0);
+  return select(0.0, 1.0, r_sq < radius_sq);
 }
 
-// 1 between two radii, else 0.
+// 1 between two radii, the agent itself (r = 0) not counted, else 0.
 fn between(r_sq: f32, inner_sq: f32, outer_sq: f32) -> f32 {
   return select(0.0, 1.0, r_sq >= inner_sq && r_sq < outer_sq && r_sq > 0.0);
 }
@@ -99,9 +99,4 @@ fn couzin(repelled: vec3<f32>, oriented: vec3<f32>, attracted: vec3<f32>, headin
 // E23, E24: a unit direction turned by an angle (given by its cosine and sine) towards the unit vector `axis`, which is normal to it.
 fn swung(direction: vec3<f32>, axis: vec3<f32>, cosine: f32, sine: f32) -> vec3<f32> {
   return direction * cosine + axis * sine;
-}
-
-// E27: drag on an agent with velocity u relative to the fluid. half_area = C_d A / 2.
-fn drag(u: vec3<f32>, rho: f32, half_area: f32) -> vec3<f32> {
-  return u * (-half_area * rho * length(u));
 }

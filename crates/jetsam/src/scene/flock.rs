@@ -122,12 +122,6 @@ pub struct Flock {
     /// Radius of an agent.
     #[serde(default = "d::flock_size")]
     pub size: f64,
-    /// Mass of an agent (per metre of depth in 2D). With it agents meet fluids and bodies and push them; Reynolds only.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mass: Option<f64>,
-    /// Drag coefficient in fluids, on the cross-section of its size (E27).
-    #[serde(default = "d::flock_drag")]
-    pub drag: f64,
 }
 
 /// The laws a flock follows.
