@@ -12,11 +12,9 @@ use jetsam::{Scene, World};
 fn every_parameter_is_a_field_with_its_range_in_the_schema() {
     let schema = jetsam::scene::schema();
     for p in PARAMS {
-        let (table, key) = p.path.split_once('.').unwrap();
-        let name = table[..1].to_uppercase() + &table[1..];
-        let field = schema
-            .pointer(&format!("/$defs/{name}/properties/{key}"))
-            .unwrap_or_else(|| panic!("`{}` is no field of a scene", p.path));
+        let place = jetsam::scene::schema_place(&schema, p.path);
+        let place = place.unwrap_or_else(|| panic!("`{}` is no field of a scene", p.path));
+        let field = schema.pointer(&place).unwrap();
         assert_eq!(field["unit"], p.unit, "{}", p.path);
         assert!(field["description"].as_str().is_some_and(|d| !d.is_empty()), "{} says nothing", p.path);
         let number = field.get("items").unwrap_or(field);

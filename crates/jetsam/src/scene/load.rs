@@ -259,18 +259,39 @@ fn step_into<'a>(value: &'a mut Value, part: &str) -> Option<&'a mut Value> {
 pub fn schema() -> serde_json::Value {
     let mut schema = schemars::schema_for!(Scene).to_value();
     for p in PARAMS {
-        let (table, key) = p.path.split_once('.').expect("paths have a table");
-        let name = match table {
-            "static" => "Static".into(),
-            _ => table[..1].to_uppercase() + &table[1..],
-        };
-        let Some(field) = schema.pointer_mut(&format!("/$defs/{name}/properties/{key}")) else { continue };
+        let Some(place) = schema_place(&schema, p.path) else { continue };
+        let field = schema.pointer_mut(&place).expect("the place was found");
         field["unit"] = p.unit.into();
         let target = if field.get("items").is_some() { &mut field["items"] } else { field };
         target["minimum"] = p.min.into();
         target["maximum"] = p.max.into();
     }
     schema
+}
+
+/// JSON pointer to the field of a dotted path (`fluid.density`, `emitter.outlet.hose.speed`) in the schema.
+pub fn schema_place(schema: &serde_json::Value, path: &str) -> Option<String> {
+    let parts: Vec<&str> = path.split('.').collect();
+    walk(schema, String::new(), &parts)
+}
+
+/// Looks below `at` for a field: through references, elements of arrays and the alternatives of a choice.
+fn walk(schema: &serde_json::Value, at: String, path: &[&str]) -> Option<String> {
+    let Some((key, rest)) = path.split_first() else { return Some(at) };
+    let node = schema.pointer(&at)?;
+    if let Some(to) = node.get("$ref").and_then(|r| r.as_str()) {
+        return walk(schema, to.strip_prefix('#')?.into(), path);
+    }
+    if node.get("properties").and_then(|p| p.get(key)).is_some() {
+        return walk(schema, format!("{at}/properties/{key}"), rest);
+    }
+    if node.get("items").is_some() {
+        return walk(schema, format!("{at}/items"), path);
+    }
+    ["oneOf", "anyOf", "allOf"].into_iter().find_map(|choice| {
+        let n = node.get(choice)?.as_array()?.len();
+        (0..n).find_map(|k| walk(schema, format!("{at}/{choice}/{k}"), path))
+    })
 }
 
 impl Scene {

@@ -17,7 +17,7 @@ pub use crate::formula::Formula;
 pub use emitter::{Emitter, Outlet, Sink};
 pub use expect::{By, Compare, Expect, Take, Validation, Variant};
 pub use flock::{Flock, FlockModel, Relation};
-pub use load::{Source, schema};
+pub use load::{Source, schema, schema_place};
 pub use probe::{Component, End, Line, Norm, Of, Probe, Space};
 
 use crate::laws::kernel::KernelSet;
