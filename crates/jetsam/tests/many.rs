@@ -40,7 +40,7 @@ fn many_bodies_keep_their_momenta() {
     for _ in 0..3000 {
         w.step(f64::INFINITY);
         touched += w.state().bodies.body.iter().filter(|b| b.contacts > 0).count();
-        if w.steps() % 100 == 0 {
+        if w.steps().is_multiple_of(100) {
             let (p, l, _, _) = momenta(&w);
             worst_p = worst_p.max((p - p_0).length() / p_scale);
             worst_l = worst_l.max((l - l_0).length() / l_scale);
@@ -125,7 +125,7 @@ fn springs_stop_what_they_can_and_say_what_they_cannot() {
         let (z, e, w) = shot(times);
         println!("{times} x: at {z:.4} m with {e:.3} of its speed, {} fast", w.ledger().fast_contacts);
         assert!(w.ledger().fast_contacts > 0, "{times}: not counted");
-        assert!(z > 0.0 && e >= 0.0 && e <= 1.0, "{times}: through to {z}");
+        assert!(z > 0.0 && (0.0..=1.0).contains(&e), "{times}: through to {z}");
     }
 }
 

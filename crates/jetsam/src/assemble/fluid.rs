@@ -30,6 +30,7 @@ pub(super) struct Drop {
 
 impl Scene {
     /// Constants, and the fluid: place, velocity, index of its fluid.
+    #[allow(clippy::too_many_arguments)] // one caller
     pub(super) fn derive(
         &self,
         grid: Grid,

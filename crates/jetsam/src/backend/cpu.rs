@@ -430,7 +430,7 @@ impl Cpu {
         self.sharers.clear();
         self.sharers.extend(b.body.iter().map(|b| b.sharers));
         self.rest.clear();
-        self.rest.extend(b.body.iter().map(|b| sleep::rest(b)));
+        self.rest.extend(b.body.iter().map(sleep::rest));
         self.stirred.iter_mut().for_each(|s| *s.get_mut() = false);
         let (spin, sharers, rest, stirred) = (&self.spin, &self.sharers, &self.rest, &self.stirred);
         let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slip: &b.slip, sharers, rest, stirred, spin };
