@@ -64,7 +64,7 @@ fn rows(world: &World) -> Vec<Row> {
             if kind == Kind::Fluid {
                 let d = p.density[i];
                 density = d * world.model().fluids[p.owner[i] as usize].density;
-                pressure = r.share * d * d;
+                pressure = jetsam::interact::pressure::pressure(world.model(), p.owner[i], d);
             }
             let ([x, y, z], [vx, vy, vz]) = (r.x, r.v);
             Row { numbers: [x, y, z, vx, vy, vz, density, pressure], kind: kind as u8, owner: p.owner[i], id: p.id[i] }

@@ -7,22 +7,29 @@ use crate::model::Model;
 use crate::scene::{Density, EquationOfState, PressureForce};
 use crate::state::Record;
 
-/// Pressure (Pa) at relative density `d` of fluid `owner`. Where densities are integrated it keeps its sign, for density
-/// diffusion; pairs cut it off.
+/// Pressure (Pa) at relative density `d` of fluid `owner`.
 #[inline]
 pub fn pressure(model: &Model, owner: u32, d: f32) -> f32 {
-    let stiffness = model.fluids[owner as usize].stiffness;
-    let p = match model.solver.equation_of_state {
-        EquationOfState::Linear => fluid::pressure_linear(d, stiffness),
-        EquationOfState::Tait => fluid::pressure_tait(d, stiffness),
-    };
-    if model.solver.negative_pressure || model.solver.density == Density::Continuity { p } else { p.max(0.0) }
+    let p = of_state(model, owner, d);
+    if model.solver.negative_pressure { p } else { p.max(0.0) }
 }
 
-/// Pressure shares of a chunk of fluid particles.
+/// Pressure of either sign (Pa), as the equation of state gives it.
+#[inline]
+fn of_state(model: &Model, owner: u32, d: f32) -> f32 {
+    let stiffness = model.fluids[owner as usize].stiffness;
+    match model.solver.equation_of_state {
+        EquationOfState::Linear => fluid::pressure_linear(d, stiffness),
+        EquationOfState::Tait => fluid::pressure_tait(d, stiffness),
+    }
+}
+
+/// Pressure shares of a chunk of fluid particles. Where densities are integrated shares keep their sign, for density diffusion;
+/// pairs cut them off.
 pub fn chunk(model: &Model, records: &mut [Record], density: &[f32], owner: &[u32]) {
+    let integrated = model.solver.density == Density::Continuity;
     for ((r, &d), &owner) in records.iter_mut().zip(density).zip(owner) {
-        let p = pressure(model, owner, d);
+        let p = if integrated { of_state(model, owner, d) } else { pressure(model, owner, d) };
         match model.solver.pressure_force {
             PressureForce::Symmetric => r.share = fluid::pressure_share(p, d),
             PressureForce::Mueller => {
