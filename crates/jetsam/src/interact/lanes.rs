@@ -176,7 +176,7 @@ impl<'a> Listed<'a> {
             largest = largest.max(u32x16::load_array_ref(simd, block));
         }
         let inside = largest.simd_lt(u32x16::splat(simd, records.len() as u32));
-        assert!(list.is_empty() || list.len() % LANES == 0 && simd.to_bitmask_mask32x16(inside) == 0xffff);
+        assert!(list.is_empty() || list.len().is_multiple_of(LANES) && simd.to_bitmask_mask32x16(inside) == 0xffff);
         Self { records, list }
     }
 
