@@ -11,8 +11,7 @@ use jetsam::{Scene, World, state_hash};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
-const HEADER: &str =
-    "scene            particles  ms/step  Mparticle-steps/s  real-time  density err  peak MB  state hash";
+const HEADER: &str = "scene            particles  neighbours  ms/step  Mparticle-steps/s  real-time  density err  peak MB  state hash\n                 milliseconds a step by stage";
 
 /// What is said of a case.
 #[derive(Serialize)]
@@ -148,16 +147,21 @@ fn measure(name: &str, scene: &Scene, steps: u64, finite: &mut bool) -> miette::
 }
 
 fn line(c: &Case) -> String {
+    let stages = c.stage_ms.0.iter().filter(|s| s.1 >= 5e-4);
+    let stages: Vec<String> = stages.map(|(stage, ms)| format!("{} {ms:.2}", stage.name())).collect();
     format!(
-        "{:16} {:9}  {:7.2}  {:17.2}  {:9.4}  {:9.3} %  {:7.0}  {}",
+        "{:16} {:9}  {:10.1}  {:7.2}  {:17.2}  {:9.4}  {:9.3} %  {:7.0}  {}\n{:17}{}",
         c.scene,
         c.particles,
+        c.neighbours,
         c.ms_per_step,
         1e-6 * c.particle_steps_per_s,
         c.real_time_factor,
         100.0 * c.density_error_mean,
         c.peak_mb,
-        c.state_hash
+        c.state_hash,
+        "",
+        stages.join(" ")
     )
 }
 

@@ -10,6 +10,9 @@ use crate::scene::{Density, Force, Solver, Viscosity};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
+/// Contacts are looked for within so many contact diameters: farther than a pair parts or meets in half a step.
+pub const CONTACT_REACH: f64 = 1.5;
+
 /// Constants of a world.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -244,6 +247,11 @@ impl Model {
             && s.shifting == 0.0
             && s.vorticity == 0.0
             && self.fluids.iter().all(|f| f.cohesion == 0.0 && f.curvature == 0.0)
+    }
+
+    /// How far contacts are looked for (m).
+    pub fn contact_reach(&self) -> f64 {
+        CONTACT_REACH * self.contact_diameter
     }
 
     /// `1 / H`.

@@ -17,7 +17,7 @@ mod surface;
 use crate::error::Result;
 use crate::interact::cells::Grid;
 use crate::mesh::Mesh;
-use crate::model::Model;
+use crate::model::{CONTACT_REACH, Model};
 use crate::scene::{Density, Force, Scene, Shape, Wall};
 use crate::state::{Bodies, Body, Particles, Record, State, Touch};
 use bodies::NewBody;
@@ -55,7 +55,7 @@ impl Scene {
         let support = self.solver.support * spacing;
         let volume = spacing.powi(dimensions as i32);
         let layers = (self.solver.support - 1e-9).ceil().max(1.0);
-        let grid = self.grid(support, layers * spacing);
+        let grid = self.grid(support.max(CONTACT_REACH * self.solver.contact_diameter * spacing), layers * spacing);
         self.check_memory(&grid)?;
 
         let mut bodies = self.rigid_bodies(&grid, volume, &mut warnings)?;
@@ -132,9 +132,9 @@ impl Scene {
         Ok(())
     }
 
-    fn grid(&self, support: f64, wall: f64) -> Grid {
+    fn grid(&self, width: f64, wall: f64) -> Grid {
         let (min, max) = (DVec3::from(self.domain.min), DVec3::from(self.domain.max));
-        Grid::new(min, max, self.domain.walls, self.world.dimensions, support, wall)
+        Grid::new(min, max, self.domain.walls, self.world.dimensions, width, wall)
     }
 
     fn check_memory(&self, grid: &Grid) -> Result<()> {

@@ -108,7 +108,7 @@ impl Backend for Cpu {
             record: p.record.clone(),
             id: p.id.clone(),
             owner: p.owner.clone(),
-            density: p.density.clone(),
+            density: if p.rate.is_empty() { Vec::new() } else { p.density.clone() },
             rate: p.rate.clone(),
             born: p.born.clone(),
         };
@@ -335,6 +335,7 @@ impl Cpu {
             first: p.first,
             asleep: &self.asleep,
             support: model.support as f32,
+            contact_reach: model.contact_reach() as f32,
         };
         let (count, first) = (p.count, p.first);
         let level = self.level;

@@ -1,4 +1,4 @@
-//! Stage `cells`: sorts the particles of a kind into cells as wide as the support.
+//! Stage `cells`: sorts the particles of a kind into cells as wide as interactions reach.
 //!
 //! In: records in any order. Out: a permutation sorted by cell (x fastest), ties by id, and where each cell
 //! begins. A stable counting sort in parallel; its result does not depend on the number of threads. Particles
@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// The box particles live in, cut into cells at least as wide as the support.
+/// The box particles live in, cut into cells at least as wide as interactions reach.
 #[derive(Clone, Debug)]
 pub struct Grid {
     /// Lower corner of the domain (m).
@@ -43,8 +43,8 @@ const OUT: u32 = 4;
 pub const DRAINED: f32 = f32::MAX;
 
 impl Grid {
-    /// Cells for a domain. `wall` is how deep solid walls reach outside the domain (m).
-    pub fn new(min: DVec3, max: DVec3, walls: [Wall; 3], dimensions: u32, support: f64, wall: f64) -> Self {
+    /// Cells `reach` wide (m) for a domain. `wall` is how deep solid walls reach outside the domain (m).
+    pub fn new(min: DVec3, max: DVec3, walls: [Wall; 3], dimensions: u32, reach: f64, wall: f64) -> Self {
         let mut grid = Self {
             min,
             max,
@@ -64,10 +64,10 @@ impl Grid {
             let pad = if walls[a] == Wall::Solid { wall } else { 0.0 };
             let (low, high) = (min[a] - pad, max[a] + pad);
             let count = match walls[a] {
-                Wall::Periodic => ((high - low) / support).floor().max(1.0),
-                _ => ((high - low) / support).ceil().max(1.0),
+                Wall::Periodic => ((high - low) / reach).floor().max(1.0),
+                _ => ((high - low) / reach).ceil().max(1.0),
             };
-            let width = if walls[a] == Wall::Periodic { (high - low) / count } else { support };
+            let width = if walls[a] == Wall::Periodic { (high - low) / count } else { reach };
             grid.origin[a] = low as f32;
             grid.inverse[a] = (1.0 / width) as f32;
             grid.cells[a] = count as i32;

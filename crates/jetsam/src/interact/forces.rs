@@ -10,7 +10,7 @@ use super::lanes::{LANES, Listed};
 use super::neighbours::{NeighbourChunk, Runs};
 use super::pairs::{Ends, Pairs, Terms, wrap};
 use crate::laws::{contact, field};
-use crate::model::Model;
+use crate::model::{CONTACT_REACH, Model};
 use crate::scene::{Coupling, Damping, Force};
 use crate::state::{Kind, Record, Touch};
 use fearless_simd::Simd;
@@ -227,7 +227,7 @@ fn sum_contacts(
         let other = &input.records[j as usize];
         let d = wrap(model, Vec3::from(other.x) - Vec3::from(own.x));
         let r = d.length();
-        if r >= 1.5 * diameter {
+        if r >= CONTACT_REACH as f32 * diameter {
             continue; // farther than a pair parts or meets in half a step
         }
         let v = Vec3::from(other.v) - Vec3::from(own.v);

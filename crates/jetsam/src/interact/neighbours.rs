@@ -1,6 +1,7 @@
 //! Neighbours, found once for all laws of a step.
 //!
-//! For each particle of a kind, the particles of each acting kind closer than the support, as indices into the
+//! For each particle of a kind, the particles of each acting kind closer than the support (between bodies: than the
+//! contact reach), as indices into the
 //! particle arrays, in the order of cells and places. Work goes by chunks of particles and inside a chunk cell by
 //! cell: the 27 cells around are packed into a tile that all particles of the cell share, and candidates are
 //! tested sixteen at a time.
@@ -119,8 +120,10 @@ pub struct Around<'a> {
     pub first: [usize; Kind::COUNT],
     /// Whether each body sleeps: its particles look for no neighbours.
     pub asleep: &'a [bool],
-    /// Support radius (m).
+    /// Support radius (m): how far pairs with fluid reach.
     pub support: f32,
+    /// How far pairs of bodies reach (m).
+    pub contact_reach: f32,
 }
 
 /// Which kinds act on a particle of kind `kind`: the table of [`crate::laws`].
@@ -153,7 +156,6 @@ impl NeighbourChunk {
     ) {
         self.runs.clear();
         self.found = false;
-        let limit = around.support * around.support;
         let mut used = 0;
         let mut from = members.start;
         while from < members.end {
@@ -177,6 +179,10 @@ impl NeighbourChunk {
             let base = used;
             let room = (to - from) * (candidates + LANES) + LANES;
             if self.list.len() < base + room {
+                let more = base + room - self.list.len();
+                if self.list.capacity() < base + room {
+                    self.list.reserve_exact(more + (base + room) / 8); // lists are most of a particle's memory
+                }
                 self.list.resize(base + room, 0);
             }
             if scratch.r_sq.len() * LANES < room {
@@ -190,6 +196,9 @@ impl NeighbourChunk {
                         continue;
                     }
                     let not = if (kind, k) == (Kind::Rigid, Kind::Rigid) { Some(around.owner[i]) } else { None };
+                    let reach =
+                        if kind == Kind::Fluid || k == Kind::Fluid { around.support } else { around.contact_reach };
+                    let limit = reach * reach;
                     let list = &mut self.list[used..];
                     let r_sq = &mut bytemuck::cast_slice_mut(&mut scratch.r_sq)[used - base..];
                     let n = near(simd, &tile.candidates(), around.records[i].x, limit, not, i as u32, list, r_sq);

@@ -18,6 +18,8 @@ pub struct Builtin {
 pub const SCENES: &[Builtin] = &[
     Builtin { name: "monkey-splash", text: include_str!("../../../../scenes/monkey-splash.toml") },
     Builtin { name: "mountain-slide", text: include_str!("../../../../scenes/mountain-slide.toml") },
+    Builtin { name: "bench-dam", text: include_str!("../../../../scenes/bench-dam.toml") },
+    Builtin { name: "bench-bricks", text: include_str!("../../../../scenes/bench-bricks.toml") },
     Builtin { name: "dam-break", text: include_str!("../../../../scenes/dam-break.toml") },
     Builtin { name: "cup", text: include_str!("../../../../scenes/cup.toml") },
     Builtin { name: "murmuration", text: include_str!("../../../../scenes/murmuration.toml") },
