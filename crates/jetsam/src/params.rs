@@ -56,7 +56,7 @@ params! {
     dt: "solver.dt", "s", _, 1e-12, 1e3;
     courant: "solver.courant", "1", 0.4, 1e-3, 1.0;
     courant_force: "solver.courant_force", "1", 0.25, 1e-3, 1.0;
-    courant_viscous: "solver.courant_viscous", "1", 0.5, 1e-3, 1.0;
+    courant_viscous: "solver.courant_viscous", "1", 0.125, 1e-3, 1.0;
     contact_overlap: "solver.contact_overlap", "dx", 0.5, 1e-4, 1.0;
     contact_diameter: "solver.contact_diameter", "dx", 1.0, 0.1, 1.5;
     sleep: "solver.sleep", "s", 0.5, 0.0, 1e9;
