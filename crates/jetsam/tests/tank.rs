@@ -116,3 +116,16 @@ fn a_deep_tank_stays_at_rest() {
     // with a summed density the upper layers creep at 2.6e-3 as they leave the cubic lattice
     Tank::new(3, 0.4, 0.4, 16.0, "density = \"continuity\"\nartificial_viscosity = 0.1").check(1e-3);
 }
+
+#[test]
+fn an_integrated_density_does_not_forget_how_close_particles_are() {
+    // water whose density says half, as that of spray may, on a lattice that is full
+    let text = "[world]\ngravity = [0, 0, 0]\n[domain]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 0.5]\n[resolution]\nspacing = 0.05\n\
+         [solver]\ndensity = \"continuity\"\nsound_speed = 20\n\
+         [[fluid]]\nshape = { box = { min = [0, 0, 0], max = [0.5, 0.5, 0.5] } }\n";
+    let mut assembly = scene(text).assemble().unwrap();
+    assembly.state.particles.density.fill(0.5);
+    let world = World::new(assembly);
+    let p = &world.state().particles;
+    assert!(p.segment(Kind::Fluid).all(|i| p.density[i] > 0.96 && p.density[i] < 0.99));
+}

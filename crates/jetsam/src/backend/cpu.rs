@@ -35,6 +35,8 @@ pub struct Cpu {
     share: Vec<f32>,
     /// Velocities that bodies' particles show to viscosity (m/s), all particles; empty where they show their own.
     mirror: Vec<[f32; 4]>,
+    /// Summed densities where they are integrated; else empty.
+    summed: Vec<f32>,
     parts: Vec<bodies::Part>,
     particle_mass: Vec<f32>,
     /// Angular velocity of each body (rad/s), for contacts.
@@ -79,6 +81,7 @@ impl Default for Cpu {
             place: Vec::new(),
             share: Vec::new(),
             mirror: Vec::new(),
+            summed: Vec::new(),
             parts: Vec::new(),
             particle_mass: Vec::new(),
             spin: Vec::new(),
@@ -344,8 +347,13 @@ impl Cpu {
             let chunks = &mut self.neighbours[kind as usize];
             chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
             let members = |c: usize| first + c * CHUNK..first + ((c + 1) * CHUNK).min(n);
-            if kind == Kind::Fluid && model.solver.density == Density::Summation {
-                chunks.par_iter_mut().zip(chunks_mut!(p.density, ..n)).enumerate().for_each(|(c, (chunk, density))| {
+            if kind == Kind::Fluid {
+                let density = match model.solver.density {
+                    Density::Summation => &mut p.density,
+                    Density::Continuity => &mut self.summed,
+                };
+                density.resize(n.max(density.len()), 1.0);
+                chunks.par_iter_mut().zip(chunks_mut!(density, ..n)).enumerate().for_each(|(c, (chunk, density))| {
                     with_scratch(|scratch| {
                         dispatch!(level, simd => {
                             density::fluid_chunk(simd, scratch, model, around, members(c), chunk, density);
@@ -367,6 +375,10 @@ impl Cpu {
     fn pressure(&mut self, model: &Model) {
         let p = &mut self.state.particles;
         let fluid = p.segment(Kind::Fluid);
+        if model.solver.density == Density::Continuity {
+            let summed = self.summed[fluid.clone()].par_chunks(CHUNK);
+            chunks_mut!(p.density, fluid.clone()).zip(summed).for_each(|(d, s)| pressure::hold(d, s));
+        }
         chunks_mut!(p.record, fluid.clone())
             .zip(p.density[fluid.clone()].par_chunks(CHUNK))
             .zip(p.owner[fluid].par_chunks(CHUNK))

@@ -24,6 +24,15 @@ fn of_state(model: &Model, owner: u32, d: f32) -> f32 {
     }
 }
 
+/// How far an integrated density may be below the summed one.
+const BELOW_SUM: f32 = 0.03;
+
+/// An integrated density (E1) is held above the summed one less a little. Spray that has parted and joins again remembers
+/// a density far below one and would be packed without resistance; in a flow that holds together this does nothing.
+pub fn hold(density: &mut [f32], summed: &[f32]) {
+    density.iter_mut().zip(summed).for_each(|(d, s)| *d = d.max(s - BELOW_SUM));
+}
+
 /// Pressure shares of a chunk of fluid particles. Where densities are integrated shares keep their sign, for density diffusion;
 /// pairs cut them off.
 pub fn chunk(model: &Model, records: &mut [Record], density: &[f32], owner: &[u32]) {
