@@ -83,6 +83,30 @@ fn a_ball_rolls_without_slipping() {
 }
 
 #[test]
+fn a_ball_of_one_particle_skids_until_it_rolls() {
+    // B6: v_0 = 1 m/s, mu = 0.3: rolls after 2/7 v_0 / (mu g) = 0.097083 s with 5/7 v_0, 0.083214 m on. Its moment of
+    // inertia is m dx^2 / 6, which is 2/5 m R^2 of the radius R = d / 2 for a contact diameter d^2 = 5/3 dx^2
+    let d = 0.1 * (5f64 / 3.0).sqrt();
+    // whatever damps the contact, and whether it stands above a particle of the floor or between
+    for (damping, x) in [(60, 0.05), (600, 0.02)] {
+        let mut w = world(&format!(
+            "[domain]\nmin = [-1, -1, 0]\nmax = [1, 1, 0.5]\nwalls = [\"open\", \"open\", \"solid\"]\n[resolution]\nspacing = 0.1\n\
+             [solver]\ncontact_diameter = {}\n[[rigid]]\nshape = {{ points = [[0, 0, 0]] }}\nmass = 1\nposition = [{x}, 0, {}]\n\
+             velocity = [1, 0, 0]\nstiffness = 1e6\ndamping = {damping}\nfriction = 0.3\n",
+            d / 0.1,
+            d - 0.05
+        ));
+        w.advance(0.097083, |_, r| r.trouble.is_none());
+        let way = w.state().bodies.body[0].x.x - x;
+        w.advance(0.2, |_, r| r.trouble.is_none());
+        let b = &w.state().bodies.body[0];
+        println!("way {way:.5} m, then {:.4} m/s, slip {:.1e}", b.v.x, 1.0 - b.omega.y * 0.5 * d / b.v.x);
+        assert!((way / 0.083214 - 1.0).abs() <= 0.02, "{way}");
+        assert!((b.v.x * 7.0 / 5.0 - 1.0).abs() <= 0.02, "{}", b.v.x);
+    }
+}
+
+#[test]
 fn the_articles_preset_has_no_friction_and_creeps() {
     // seed law: the full dashpot alone holds a block back: it reaches v = m g sin / (n eta) and never sticks
     let text = "[world]\ngravity = [4.905, 0, -8.4957]\n[domain]\nmin = [-0.2, -0.2, 0]\nmax = [1.0, 0.2, 0.4]\n\

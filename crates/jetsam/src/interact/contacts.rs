@@ -1,7 +1,7 @@
 //! Contacts of particles of different bodies (E10-E13), seen from one of them; called by the stage `forces`.
 //!
 //! In: the neighbours of a body's particle, surface normals, tangential slips, spins. Out: a [`Touch`]: force, the couple
-//! of forces that act at the middle between two particles, the slip that friction remembers, what was counted.
+//! of forces that act where two particles touch, the slip that friction remembers, what was counted.
 
 use super::forces::Input;
 use super::pairs::wrap;
@@ -83,6 +83,8 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
         let other_slot = surfaces.slot[j as usize] as usize;
         let (mut n, mut along, mut s, mut part) = (d * (1.0 / r.max(1e-12)), d, r, 1.0);
         let (a, b) = (surfaces.facing[slot], surfaces.facing[other_slot]);
+        // where they touch, seen from i: midway, or where a ball stands on a face
+        let mut arm = 0.5 * d;
         if smooth && (a, b) != ([0.0; 3], [0.0; 3]) {
             let normal = contact::contact_normal(d.to_array(), r, a, b);
             let normal = Vec3::new(normal.x, normal.y, normal.z);
@@ -90,6 +92,11 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
                 (n, s) = (normal, d.dot(normal));
                 along = n * s;
                 part = contact::contact_part((d - along).length() / model.spacing as f32);
+                if b == [0.0; 3] {
+                    arm = d - 0.5 * along;
+                } else if a == [0.0; 3] {
+                    arm = 0.5 * along;
+                }
             }
         }
         if s >= 1.5 * diameter || part <= 0.0 {
@@ -97,9 +104,9 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
         }
         let mut v = Vec3::from(other.v) - Vec3::from(own.v);
         if !full {
-            // velocities where the bodies touch, at the middle
+            // velocities where the bodies touch
             let spin = |body: u32| Vec3::from(surfaces.spin[body as usize]);
-            v -= 0.5 * (spin(owner) + spin(body)).cross(d);
+            v -= spin(owner).cross(arm) + spin(body).cross(d - arm);
         }
         let counted = surfaces.sharers[owner as usize].max(surfaces.sharers[body as usize]);
         let (k, eta) = model.contact_pair_of(owner, body, counted);
@@ -134,7 +141,7 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
         }
         touch.contact = (Vec3::from(touch.contact) + f).to_array();
         if !full {
-            touch.couple = (Vec3::from(touch.couple) + 0.5 * d.cross(f)).to_array();
+            touch.couple = (Vec3::from(touch.couple) + arm.cross(f)).to_array();
         }
     }
 }
