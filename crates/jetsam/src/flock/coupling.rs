@@ -15,8 +15,10 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Below this fraction of a fluid's weight around it an agent is dry.
+/// Below this part of its support filled with fluid an agent is dry.
 const DRY: f32 = 1e-6;
+/// From this part on it is all wet.
+const WET: f32 = 0.9;
 
 /// What one particle gets from one agent (N).
 #[derive(Clone, Copy, Debug)]
@@ -105,16 +107,16 @@ fn drag(world: &World, matter: &Matter, me: &Record, v: Vec3, dt: f32, pushes: &
     let begun = pushes.len();
     let kernel = model.kernel.density();
     let (support, inverse) = (model.support as f32, model.inverse_support());
-    let (mut density, mut momentum, mut rest) = (0.0, Vec3::ZERO, 0.0f32);
+    let (mut mass, mut momentum, mut filled) = (0.0, Vec3::ZERO, 0.0);
     each_near(world, Kind::Fluid, me.x, support, |j, d| {
         let fluid = &model.fluids[p.owner[j] as usize];
         let weight = fluid.mass * model.factors.w * kernel.w(d.length() * inverse);
-        density += weight;
+        mass += weight;
         momentum += weight * Vec3::from(p.record[j].v);
-        rest = rest.max(fluid.density);
+        filled += weight / fluid.density;
         pushes.push(Push { particle: j, fluid: true, force: Vec3::splat(weight) });
     });
-    if density <= DRY * rest {
+    if filled <= DRY {
         return pushes.truncate(begun);
     }
     let around = &mut pushes[begun..];
@@ -122,11 +124,12 @@ fn drag(world: &World, matter: &Matter, me: &Record, v: Vec3, dt: f32, pushes: &
     let yields = around
         .iter_mut()
         .map(|push| {
-            push.force /= density;
+            push.force /= mass;
             push.force.x * push.force.x / model.fluids[p.owner[push.particle] as usize].mass
         })
         .sum::<f32>();
-    let u = v - momentum / density;
+    let u = v - momentum / mass;
+    let density = mass / filled.max(WET);
     let f = flock::drag(u.to_array(), density, matter.half_area, dt * (1.0 / matter.mass + yields));
     let f = Vec3::new(f.x, f.y, f.z);
     around.iter_mut().for_each(|push| push.force *= -f);

@@ -164,7 +164,7 @@ impl Meter {
             Of::DensityErrorMax => ledger.density_error_max,
             Of::Lost => (ledger.lost + ledger.rigid_lost as u64) as f64,
             Of::Left => ledger.left as f64,
-            Of::Polarization | Of::Milling | Of::Fragments => match self.subject {
+            Of::Polarization | Of::Milling | Of::Fragments | Of::LargestFragment => match self.subject {
                 Subject::Flock(f) => order(self.of, &world.flock_order(f)),
                 _ => f64::NAN,
             },
@@ -197,6 +197,7 @@ fn order(of: Of, order: &Order) -> f64 {
     match of {
         Of::Polarization => order.polarization,
         Of::Milling => order.milling,
+        Of::LargestFragment => order.largest,
         _ => order.fragments as f64,
     }
 }
@@ -256,7 +257,7 @@ fn keys(of: Of) -> (&'static [&'static str], &'static [&'static str]) {
         }
         Of::KernelIntegral | Of::KernelSum | Of::KernelGradientSum | Of::KernelNeighbours => (&[], KERNEL),
         Of::ContactStiffness | Of::ContactDamping => (&["body"], &["body", "other"]),
-        Of::Polarization | Of::Milling | Of::Fragments => (&["flock"], &["flock"]),
+        Of::Polarization | Of::Milling | Of::Fragments | Of::LargestFragment => (&["flock"], &["flock"]),
         Of::Formula => (&["formula"], &["formula"]),
         _ => (&[], &[]),
     }

@@ -215,6 +215,8 @@ pub enum Of {
     Milling,
     /// Parts of a `flock` between which nobody perceives anybody.
     Fragments,
+    /// Part of a `flock` that the largest of them has.
+    LargestFragment,
     /// A `formula` of other probes.
     Formula,
 }
