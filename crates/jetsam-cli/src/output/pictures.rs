@@ -14,6 +14,8 @@ const WIDTH: usize = 1280;
 const HEIGHT: usize = 720;
 /// Radius of a ball in spacings: neighbours overlap a little, so that water looks closed.
 const RADIUS: f64 = 0.56;
+/// The same where agents swim, who would not be seen in closed water.
+const SHEER: f64 = 0.14;
 /// Speed shown white, as a fraction of the largest speed the scene can reach.
 const FAST: f64 = 0.8;
 /// Length of a dart in sizes of an agent; in radii of the flock where agents have no size.
@@ -107,10 +109,12 @@ impl Painter {
         let (mut balls, mut shells) = (Vec::new(), Vec::new());
         let (p, bodies) = (&world.state().particles, &world.state().bodies.body);
         let radius = (RADIUS * world.model().spacing) as f32;
+        let swimmers = world.model().flocks.iter().any(|f| f.keep_to_fluids);
+        let drop = if swimmers { (SHEER * world.model().spacing) as f32 } else { radius };
         let fast = (FAST * world.model().largest_speed) as f32;
         for r in &p.record[p.segment(Kind::Fluid)] {
             let speed = Vec3::from(r.v).length();
-            balls.push(Ball { center: r.x.into(), radius, color: color::water((speed / fast).powf(SLOW)) });
+            balls.push(Ball { center: r.x.into(), radius: drop, color: color::water((speed / fast).powf(SLOW)) });
         }
         for i in p.segment(Kind::Rigid).chain(p.segment(Kind::Static)) {
             if let Look::Balls(color) = self.looks[p.owner[i] as usize] {
