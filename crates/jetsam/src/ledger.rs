@@ -11,7 +11,7 @@ pub struct Ledger {
     pub body_speed: f64,
     /// Largest acceleration of any fluid particle (m/s^2).
     pub acceleration: f64,
-    /// Momentum of fluids and rigid bodies (kg m/s).
+    /// Momentum of fluids, rigid bodies and agents of mass (kg m/s).
     pub momentum: DVec3,
     /// Sum of the magnitudes of the momenta of particles and bodies (kg m/s).
     pub momentum_scale: f64,
@@ -19,9 +19,9 @@ pub struct Ledger {
     pub crossed: DVec3,
     /// Force from outside: walls, static bodies, gravity, fields (N).
     pub external_force: DVec3,
-    /// Impulse of this step by joints to what does not move (N s).
+    /// Impulse of this step by joints to what does not move, and of agents by themselves (N s).
     pub external_impulse: DVec3,
-    /// Sum of all forces on fluids and rigid bodies (N): equals `external_force` up to rounding (E12, C9).
+    /// Sum of all forces on fluids, rigid bodies and agents (N): equals `external_force` up to rounding (E12, C9).
     pub total_force: DVec3,
     /// Sum of the magnitudes of the forces on fluids' and bodies' particles (N).
     pub force_scale: f64,

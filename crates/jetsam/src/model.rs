@@ -357,6 +357,14 @@ impl Model {
         self.contact_constants(reduced_mass, b.ln_restitution, 1.0, 1.0, b.stiffness, b.damping)
     }
 
+    /// Spring constant and dashpot between an agent of a mass (kg) and a particle of body `b` (E14, E28).
+    #[inline]
+    pub fn agent_pair(&self, mass: f32, b: u32) -> (f32, f32) {
+        let b = &self.contacts[b as usize];
+        let reduced_mass = 1.0 / (1.0 / mass + b.inverse_mass);
+        self.contact_constants(reduced_mass, b.ln_restitution, 1.0, 1.0, b.stiffness, b.damping)
+    }
+
     #[inline]
     fn contact_constants(
         &self,
@@ -399,6 +407,16 @@ impl Model {
             dt = dt.min(flock.largest_dt());
             if meet_bodies {
                 dt = dt.min(0.5 * self.spacing / f64::from(flock.limits.fastest));
+            }
+            if let Some(matter) = &flock.matter {
+                let period = |b: usize| {
+                    let mass = 1.0 / (1.0 / matter.mass + self.contacts[b].inverse_mass);
+                    PI * f64::from(mass / self.agent_pair(matter.mass, b as u32).0).sqrt()
+                };
+                let contact = (0..self.contacts.len()).map(period).fold(f64::INFINITY, f64::min);
+                if contact.is_finite() {
+                    self.dt_bounds.push((DtBound::Contact, contact / 20.0));
+                }
             }
         }
         if dt.is_finite() {

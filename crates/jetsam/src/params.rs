@@ -127,6 +127,8 @@ params! {
     flock_noise: "flock.noise", "rad", 0.0, 0.0, 100.0;
     flock_tau: "flock.tau", "s", _, 0.0, 1e6;
     flock_size: "flock.size", "m", 0.0, 0.0, 1e4;
+    flock_mass: "flock.mass", "kg", _, 1e-12, 1e9;
+    flock_drag: "flock.drag", "1", 0.5, 0.0, 1e3;
     fov: "camera.fov", "degrees", 35.0, 1.0, 170.0;
 }
 

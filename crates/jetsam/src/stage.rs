@@ -22,7 +22,7 @@ pub enum Stage {
     Gradients,
     /// Forces on every particle (E4-E6, E10-E12, E16, E30).
     Forces,
-    /// Agents of flocks move and decide (E22-E26).
+    /// Agents of flocks move, push and decide (E22-E28).
     Agents,
     /// Force and torque summed per body (E18).
     Bodies,

@@ -271,6 +271,10 @@ pub struct Agents {
     pub id: Vec<u32>,
     /// What was decided: steering (m/s^2) of Reynolds' agents, else the velocity to come (m/s). Written by agents.
     pub next: Vec<[f32; 3]>,
+    /// What rounding left over of each agent's position (m): the place is `x` less this. Written by agents.
+    pub rest: Vec<[f32; 3]>,
+    /// Force by fluids and bodies (N); empty where no flock has mass. Written by agents.
+    pub force: Vec<[f32; 3]>,
     /// Time of each flock. Written by agents.
     pub clock: Vec<Clock>,
 }

@@ -113,7 +113,8 @@ fn one_alone_flies_straight() {
         w.advance(30.0, |_, _| true);
         let a = agents(&w)[0];
         let expected = Vec3::new(1.0, 2.0, 3.0) + 60.0 * Vec3::new(1.0, 2.0, 2.0) / 3.0;
-        assert!((x(&a) - expected).length() < 1e-5 * 60.0, "{model}: {}", x(&a));
+        println!("straight {:e}", (x(&a) - expected).length());
+        assert!((x(&a) - expected).length() < 1e-6 * 60.0, "{model}: {}", x(&a));
     }
 }
 
@@ -164,8 +165,10 @@ fn turning_moving_or_renumbering_a_flock_changes_nothing_else() {
         let error = |r: &Record, place: Vec3, velocity: Vec3| (x(r) - place).length().max((v(r) - velocity).length());
         // a few units in the last place of coordinates of three metres, after five steps
         let e = error(&turned[k], turn * x(p), turn * v(p));
+        println!("turned {e:e}");
         assert!(e < 1e-5, "turned: {k} is off by {e}");
         let e = error(&moved[k], x(p) + by, v(p));
+        println!("moved {e:e}");
         assert!(e < 1e-5, "moved: {k} is off by {e}");
         let e = error(&reversed[plain.len() - 1 - k], x(p), v(p));
         assert!(e < 1e-5, "renumbered: {k} is off by {e}");

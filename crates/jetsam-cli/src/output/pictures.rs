@@ -14,10 +14,14 @@ const WIDTH: usize = 1280;
 const HEIGHT: usize = 720;
 /// Radius of a ball in spacings: neighbours overlap a little, so that water looks closed.
 const RADIUS: f64 = 0.56;
+/// The same where agents swim, who would not be seen in closed water.
+const SHEER: f64 = 0.14;
 /// Speed shown white, as a fraction of the largest speed the scene can reach.
 const FAST: f64 = 0.8;
 /// Length of a dart in sizes of an agent; in radii of the flock where agents have no size.
-const DART: [f32; 2] = [4.0, 0.22];
+const DART: [f32; 2] = [4.0, 0.14];
+/// Flocks of more agents than this are drawn darker: they are seen against the sky, by how dense they are.
+const MANY: f32 = 3000.0;
 /// Below 1: slow water is told apart better than fast water.
 const SLOW: f32 = 0.7;
 const EDGES: [f32; 3] = [0.24, 0.26, 0.29];
@@ -91,10 +95,11 @@ impl Painter {
                 Camera::framing(min - margin, max + margin, from, 0.5, WIDTH as f32 / HEIGHT as f32)
             }
         };
+        let bounded = scene.domain.walls.iter().any(|w| *w != Wall::Open);
         let solid_floor = !flat && scene.domain.walls[2] == Wall::Solid && scene.world.gravity[2] < 0.0;
         Self {
             camera,
-            edges: box_edges(min, max, EDGES).into(),
+            edges: if bounded { box_edges(min, max, EDGES).into() } else { Vec::new() },
             ground: solid_floor.then_some(min.z),
             looks: looks(world),
         }
@@ -104,10 +109,12 @@ impl Painter {
         let (mut balls, mut shells) = (Vec::new(), Vec::new());
         let (p, bodies) = (&world.state().particles, &world.state().bodies.body);
         let radius = (RADIUS * world.model().spacing) as f32;
+        let swimmers = world.model().flocks.iter().any(|f| f.keep_to_fluids);
+        let drop = if swimmers { (SHEER * world.model().spacing) as f32 } else { radius };
         let fast = (FAST * world.model().largest_speed) as f32;
         for r in &p.record[p.segment(Kind::Fluid)] {
             let speed = Vec3::from(r.v).length();
-            balls.push(Ball { center: r.x.into(), radius, color: color::water((speed / fast).powf(SLOW)) });
+            balls.push(Ball { center: r.x.into(), radius: drop, color: color::water((speed / fast).powf(SLOW)) });
         }
         for i in p.segment(Kind::Rigid).chain(p.segment(Kind::Static)) {
             if let Look::Balls(color) = self.looks[p.owner[i] as usize] {
@@ -156,7 +163,8 @@ fn darts(world: &World) -> Vec<Facet> {
     let mut all = Vec::new();
     let agents = &world.state().agents;
     for flock in &world.model().flocks {
-        let color = color::of_name(&flock.name);
+        let shade = (MANY / flock.count as f32).min(1.0).sqrt();
+        let color = color::of_name(&flock.name).map(|c| shade * c);
         let length = if flock.size > 0.0 { DART[0] * flock.size } else { DART[1] * flock.radius };
         for r in &agents.record[flock.range()] {
             let (x, along) = (Vec3::from(r.x), Vec3::from(r.v).try_normalize().unwrap_or(Vec3::X));

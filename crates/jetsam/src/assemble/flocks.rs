@@ -45,7 +45,15 @@ impl Scene {
                 })?),
             };
             self.check_flock(flock, &key)?;
-            all.push(FlockConstants::new(flock, index, first, relations, leader, self.world.seed));
+            all.push(FlockConstants::new(
+                flock,
+                index,
+                first,
+                relations,
+                leader,
+                self.world.dimensions,
+                self.world.seed,
+            ));
             first += flock.count as usize;
         }
         let reaches = all.iter().flat_map(|f| (0..all.len()).map(|j| f64::from(f.reach(j))));
@@ -63,7 +71,8 @@ impl Scene {
 
     /// Particles of bodies, as far away from them as agents have to stay.
     pub(super) fn obstacles(&self, flocks: &[FlockConstants], bodies: &[NewBody]) -> Near {
-        let clear = flocks.iter().map(|f| f64::from(f.clearance(self.resolution.spacing as f32))).fold(0.0, f64::max);
+        let (spacing, overlap) = (self.resolution.spacing, self.solver.contact_overlap);
+        let clear = flocks.iter().map(|f| f.contact(spacing, overlap)).fold(0.0, f64::max);
         let mut near = Near::new(clear.max(self.resolution.spacing));
         if !flocks.is_empty() {
             bodies.iter().flat_map(NewBody::points).for_each(|p| near.insert(p));
@@ -79,11 +88,16 @@ impl Scene {
             let help = format!("name one of {}, bodies, fluids", names.join(", "));
             return Err(self.error(&place, message, help));
         }
-        if things && !matches!(relation, Relation::Flee | Relation::Ignore) {
-            let message = format!("`{place}`: {other} can be fled or ignored");
+        let possible = match other {
+            "fluids" => !matches!(relation, Relation::Chase),
+            "bodies" => matches!(relation, Relation::Flee | Relation::Ignore),
+            _ => true,
+        };
+        if !possible {
+            let message = format!("`{place}`: bodies can be fled or ignored, fluids also be schooled with (stayed in)");
             return Err(self.error(&place, message, "write \"flee\" or \"ignore\""));
         }
-        let steers = matches!(relation, Relation::Flee | Relation::Chase);
+        let steers = matches!(relation, Relation::Flee | Relation::Chase) || things && relation == Relation::School;
         if steers && flock.model != FlockModel::Reynolds {
             let message = format!("`{place}`: fleeing and chasing are rules of the model \"reynolds\"");
             return Err(self.error(&place, message, "choose model = \"reynolds\", or \"school\" or \"ignore\" here"));
@@ -99,6 +113,7 @@ impl Scene {
             ("speed_min", flock.speed_min.is_some()),
             ("speed_max", flock.speed_max.is_some()),
             ("acceleration", flock.acceleration.is_some()),
+            ("mass", flock.mass.is_some()),
         ] {
             if given && !reynolds {
                 let message =
@@ -109,6 +124,14 @@ impl Scene {
                     "leave it out, or choose model = \"reynolds\"",
                 ));
             }
+        }
+        if flock.drag.is_some() && flock.mass.is_none() {
+            let message = format!("`{key}.drag` has no meaning without a mass: nothing pushes these agents");
+            return Err(self.error(&format!("{key}.drag"), message, "give the agents a mass, or leave drag out"));
+        }
+        if flock.mass.is_some() && flock.size == 0.0 {
+            let message = format!("`{key}.mass`: agents that push need a size");
+            return Err(self.error(&format!("{key}.mass"), message, "give their radius as size"));
         }
         if reynolds && flock.noise > 0.0 {
             let message = format!("`{key}.noise` is a number of Couzin's and Vicsek's models");
@@ -159,6 +182,10 @@ impl Scene {
             }
         }
         agents.id = (0..agents.record.len() as u32).collect();
+        agents.rest = vec![[0.0; 3]; agents.id.len()];
+        if flocks.iter().any(|f| f.matter.is_some()) {
+            agents.force = vec![[0.0; 3]; agents.id.len()];
+        }
         Ok(agents)
     }
 

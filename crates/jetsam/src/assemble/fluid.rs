@@ -221,6 +221,9 @@ impl Scene {
         for source in sources {
             speed = speed.max(source.velocity.length());
         }
+        for f in self.flock.iter().filter(|f| f.mass.is_some()) {
+            speed = speed.max(f.speed_max.unwrap_or(1.5 * f.speed));
+        }
         for body in bodies {
             let reach = body.offset.iter().map(|o| o.length()).fold(0.0, f64::max);
             if let Some(path) = &body.path {

@@ -512,6 +512,7 @@ impl Cpu {
         let cells = [&self.cells[0], &self.cells[1], &self.cells[2]];
         let world = Surroundings { model, particles, cells, bodies: &bodies.body, radius: &self.body_radius };
         self.crowd.run(self.level, &world, agents, advance);
+        self.crowd.give_back(model, particles, &self.stirred);
         self.ledger.nonfinite += self.crowd.nonfinite as u64;
     }
 
@@ -567,7 +568,7 @@ impl Cpu {
 
     fn tally(&mut self, model: &Model, advance: Advance) {
         let gravity = model.gravity_at(advance.end());
-        let State { particles: p, bodies: b, .. } = &self.state;
+        let State { particles: p, bodies: b, agents: a } = &self.state;
         let fluid = p.segment(Kind::Fluid);
         let n = fluid.len();
         self.sums.resize_with(n.div_ceil(CHUNK), Ledger::default);
@@ -595,7 +596,7 @@ impl Cpu {
             nonfinite: self.ledger.nonfinite,
             fast_contacts: self.ledger.fast_contacts,
             external_force: self.held + b.joint_force,
-            external_impulse: b.joint_impulse,
+            external_impulse: b.joint_impulse + self.crowd.impulse,
             fluid: n,
             rigid_lost: self.cells[Kind::Rigid as usize].lost.saturating_sub(self.scripted_outside(model)),
             ..Ledger::default()
@@ -635,6 +636,18 @@ impl Cpu {
             total.force_scale += body.force.length();
             if !(body.x.is_finite() && body.v.is_finite() && body.l.is_finite()) {
                 total.nonfinite += 1;
+            }
+        }
+        for flock in &model.flocks {
+            let Some(matter) = &flock.matter else { continue };
+            let mass = f64::from(matter.mass);
+            for (r, force) in a.record[flock.range()].iter().zip(&a.force[flock.range()]) {
+                let (v, force) = (DVec3::from(r.v.map(f64::from)), DVec3::from(force.map(f64::from)));
+                total.momentum += mass * v;
+                total.momentum_scale += mass * v.length();
+                total.total_force += force;
+                total.force_scale += force.length();
+                total.kinetic += 0.5 * mass * v.length_squared();
             }
         }
         for (slot, record) in b.record[..b.rigid_slots].iter().enumerate() {

@@ -186,6 +186,9 @@ fn steer(view: View, own: usize, i: usize, sums: &Sums) -> Vec3 {
         a += vec3!(flock::seek(v, sums.chased.to_array(), u.fastest, 0.0, w.chase));
     }
     a += w.avoid * keep_in(view, rule, me);
+    if rule.keep_to_fluids {
+        a += w.avoid * obstacles::into_fluid(view.world, me.x);
+    }
     if w.avoid > 0.0 && view.world.has_bodies() {
         a += w.avoid * obstacles::ahead(view.world, rule, me);
     }

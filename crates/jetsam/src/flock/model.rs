@@ -38,6 +38,10 @@ pub struct FlockConstants {
     pub leader: Option<(usize, f32)>,
     /// What they do about each flock, in the order of the scene.
     pub relations: Vec<Relation>,
+    /// What agents that push are made of; `None` for those that only look.
+    pub matter: Option<Matter>,
+    /// Whether they stay in fluids.
+    pub keep_to_fluids: bool,
     /// Whether they flee bodies.
     pub flee_bodies: bool,
     /// Whether they flee fluids.
@@ -54,6 +58,15 @@ pub struct FlockConstants {
     pub size: f32,
     /// Seed of its random numbers.
     pub seed: u64,
+}
+
+/// What an agent is made of that pushes and is pushed (E27, E28).
+#[derive(Clone, Copy, Debug)]
+pub struct Matter {
+    /// Mass (kg; kg/m in 2D).
+    pub mass: f32,
+    /// Half the coefficient of drag times the cross-section (m^2; m in 2D).
+    pub half_area: f32,
 }
 
 /// Speeds and turns (SI).
@@ -110,6 +123,7 @@ impl FlockConstants {
         first: usize,
         relations: Vec<Relation>,
         leader: Option<usize>,
+        dimensions: u32,
         seed: u64,
     ) -> Self {
         let f = flock;
@@ -125,7 +139,9 @@ impl FlockConstants {
         let radius = if f.model == FlockModel::Vicsek { radii[1] } else { radii.into_iter().fold(0.0, f32::max) };
         let half = (0.5 * f.field_of_view).to_radians().cos();
         let constant = f.model != FlockModel::Reynolds;
-        let is_flee = |key: &str| f.meets.get(key) == Some(&Relation::Flee);
+        let is = |key: &str, relation| f.meets.get(key) == Some(&relation);
+        let section = if dimensions == 2 { 2.0 * f.size } else { std::f64::consts::PI * f.size * f.size };
+        let drag = f.drag.unwrap_or_else(crate::params::default::flock_drag);
         Self {
             name: name(flock),
             model: f.model,
@@ -161,8 +177,10 @@ impl FlockConstants {
             goal: f.goal.map(|g| (DVec3::from(g).as_vec3(), f.arrive as f32)),
             leader: leader.map(|l| (l, or(f.follow_distance, r))),
             relations,
-            flee_bodies: is_flee("bodies"),
-            flee_fluids: is_flee("fluids"),
+            matter: f.mass.map(|m| Matter { mass: m as f32, half_area: (0.5 * drag * section) as f32 }),
+            keep_to_fluids: is("fluids", Relation::School),
+            flee_bodies: is("bodies", Relation::Flee),
+            flee_fluids: is("fluids", Relation::Flee),
             look_ahead: or(f.look_ahead, t),
             margin: [or(f.margin, r), or(f.margin, 0.0)],
             noise: f.noise,
@@ -184,6 +202,12 @@ impl FlockConstants {
     /// How far an agent's centre stays from the particles of bodies (m), which lie `spacing` apart.
     pub fn clearance(&self, spacing: f32) -> f32 {
         (self.size + 0.5 * spacing).max(1.25 * spacing)
+    }
+
+    /// Distance from a body's particle below which an agent of mass is pushed (m), when contacts may overlap by the fraction `overlap` of
+    /// the `spacing`: outside the distance at which it is held.
+    pub fn contact(&self, spacing: f64, overlap: f64) -> f64 {
+        f64::from(self.clearance(spacing as f32)) + if self.matter.is_some() { overlap * spacing } else { 0.0 }
     }
 
     /// How far away an agent of flock `other` can be that matters (m). Topological neighbours have no such bound.

@@ -10,18 +10,33 @@ use crate::interact::cells::Grid;
 use crate::laws::flock;
 use crate::scene::{FlockModel, Wall};
 use crate::state::Record;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Cosine and sine of an angle that a turn may reach; none is too large from half a turn on.
 pub fn turn(angle: f64) -> (f32, f32) {
     if angle >= std::f64::consts::PI { (-2.0, 0.0) } else { (angle.cos() as f32, angle.sin() as f32) }
 }
 
-/// Moves a chunk of agents of one flock by `dt` (s).
-pub fn chunk(world: &World, rule: &FlockConstants, dt: f64, records: &mut [Record], next: &mut [[f32; 3]]) {
+/// Chunks of the arrays of agents, all of one flock.
+pub struct Part<'a> {
+    pub record: &'a mut [Record],
+    pub next: &'a mut [[f32; 3]],
+    pub rest: &'a mut [[f32; 3]],
+    pub force: &'a [[f32; 3]],
+}
+
+/// Moves a chunk of agents of one flock by `dt` (s), after a kick of `first` (s) with the forces of the step before. Returns the momentum
+/// (kg m/s) that they take by themselves: by steering, and at sides and bodies that turn them round.
+pub fn chunk(world: &World, rule: &FlockConstants, dt: f64, first: f64, part: Part) -> DVec3 {
+    let Part { record, next, rest, force } = part;
+    let mut own = DVec3::ZERO;
     let turn = turn(rule.limits.turn * dt);
     let obstacles = world.has_bodies();
-    for (r, next) in records.iter_mut().zip(next) {
+    for (k, (r, next)) in record.iter_mut().zip(next).enumerate() {
+        if let Some(matter) = &rule.matter {
+            r.v = (Vec3::from(r.v) + first as f32 / matter.mass * Vec3::from(force[k])).to_array();
+        }
+        let kicked_by_others = r.v;
         match rule.model {
             FlockModel::Reynolds => r.v = kicked(rule, r, *next, dt as f32, turn),
             FlockModel::Couzin => r.v = *next,
@@ -29,7 +44,10 @@ pub fn chunk(world: &World, rule: &FlockConstants, dt: f64, records: &mut [Recor
         }
         let before = r.x;
         for a in 0..3 {
-            r.x[a] += dt as f32 * r.v[a];
+            // what rounding left over is carried on (Kahan)
+            let step = dt as f32 * r.v[a] - rest[k][a];
+            r.x[a] += step;
+            rest[k][a] = (r.x[a] - before[a]) - step;
         }
         let sides = inside(&world.model.grid, rule.size, &mut r.x);
         for a in 0..3 {
@@ -45,13 +63,22 @@ pub fn chunk(world: &World, rule: &FlockConstants, dt: f64, records: &mut [Recor
             }
         }
         world.model.grid.wrap(&mut r.x);
+        if let Some(matter) = &rule.matter {
+            own += f64::from(matter.mass) * (Vec3::from(r.v).as_dvec3() - Vec3::from(kicked_by_others).as_dvec3());
+        }
     }
+    own
 }
 
 /// Velocity after a step of Reynolds' agents.
 fn kicked(rule: &FlockConstants, r: &Record, steering: [f32; 3], dt: f32, turn: (f32, f32)) -> [f32; 3] {
-    let heading = Vec3::from(r.v).normalize_or_zero().to_array();
-    let v = flock::moved(r.v, steering, dt, heading, turn.0, turn.1, rule.limits.slowest, rule.limits.fastest);
+    let (speed, heading) = (Vec3::from(r.v).length(), Vec3::from(r.v).normalize_or_zero().to_array());
+    let (mut slowest, mut fastest) = (rule.limits.slowest, rule.limits.fastest);
+    if rule.matter.is_some() {
+        // limits hold for what agents do themselves: one that is pushed beyond them is not brought back at once
+        (slowest, fastest) = (slowest.min(speed), fastest.max(speed));
+    }
+    let v = flock::moved(r.v, steering, dt, heading, turn.0, turn.1, slowest, fastest);
     [v.x, v.y, v.z]
 }
 

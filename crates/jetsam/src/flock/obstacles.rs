@@ -53,6 +53,18 @@ pub fn each_near(world: &World, kind: Kind, x: [f32; 3], radius: f32, mut f: imp
     }
 }
 
+/// Where to steer so as to stay in a fluid: towards the middle of the fluid within two supports, 1 at its surface.
+pub fn into_fluid(world: &World, x: [f32; 3]) -> Vec3 {
+    let radius = 2.0 * world.model.support as f32;
+    let (mut sum, mut count) = (Vec3::ZERO, 0.0);
+    each_near(world, Kind::Fluid, x, radius, |_, d| {
+        sum += d;
+        count += 1.0;
+    });
+    // the middle of half a ball is 3/8 of its radius away
+    if count > 0.0 { (sum / (0.375 * radius * count)).clamp_length_max(1.0) } else { Vec3::ZERO }
+}
+
 /// Where to steer because of what stands ahead: a direction across the heading, longer the nearer it is, at most 1.
 pub fn ahead(world: &World, rule: &FlockConstants, me: &Record) -> Vec3 {
     let v = Vec3::from(me.v);

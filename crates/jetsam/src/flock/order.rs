@@ -21,6 +21,8 @@ pub struct Order {
     pub milling: f64,
     /// Parts between which nobody perceives anybody.
     pub fragments: usize,
+    /// Part of the flock that its largest fragment has.
+    pub largest: f64,
 }
 
 impl Order {
@@ -49,8 +51,9 @@ impl Order {
             along += v;
             around += arm.normalize_or_zero().cross(v);
         }
-        let fragments = fragments(model, flock, &records);
-        Self { n: records.len(), polarization: along.length() / n, milling: around.length() / n, fragments }
+        let (fragments, largest) = fragments(model, flock, &records);
+        let (polarization, milling) = (along.length() / n, around.length() / n);
+        Self { n: records.len(), polarization, milling, fragments, largest: largest as f64 / n }
     }
 }
 
@@ -74,8 +77,8 @@ fn center(model: &Model, records: &[Record]) -> DVec3 {
     center
 }
 
-/// Connected parts: metric agents are linked within their radius, topological ones with their nearest.
-fn fragments(model: &Model, flock: &FlockConstants, records: &[Record]) -> usize {
+/// Number of connected parts and size of the largest: metric agents are linked within their radius, topological ones with their nearest.
+fn fragments(model: &Model, flock: &FlockConstants, records: &[Record]) -> (usize, usize) {
     let near = Within::new(model, flock, records);
     let inside = near.sorted.len();
     let mut sets = Sets::new(inside);
@@ -90,7 +93,10 @@ fn fragments(model: &Model, flock: &FlockConstants, records: &[Record]) -> usize
             near.each(i, |j| sets.join(i, j));
         }
     }
-    sets.count + (records.len() - inside)
+    let mut sizes = vec![0; inside];
+    (0..inside).for_each(|i| sizes[sets.root(i)] += 1);
+    let largest = sizes.into_iter().max().unwrap_or(1);
+    (sets.count + (records.len() - inside), largest)
 }
 
 /// Mean number of others within the radius of an agent; of topological neighbours, their number.

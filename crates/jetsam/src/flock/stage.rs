@@ -1,18 +1,21 @@
 //! The stage `agents`: agents move, are sorted, and decide.
 
+use super::coupling::Coupling;
 use super::decide::{self, View, with_scratch};
 use super::model::FlockConstants;
-use super::motion;
+use super::motion::{self, Part};
 use super::perception::{Sorted, grid_about};
-use crate::integrate::Advance;
+use crate::integrate::{Advance, bodies};
 use crate::interact::CHUNK;
 use crate::interact::cells::{Cells, Grid};
 use crate::model::Model;
 use crate::state::{Agents, Body, Kind, Particles, Record};
+use bytemuck::Zeroable;
 use fearless_simd::{Level, dispatch};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::sync::atomic::Ordering::Relaxed;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 /// What is around the agents.
 #[derive(Clone, Copy)]
@@ -59,9 +62,10 @@ pub struct Crowd {
     inside: Vec<usize>,
     grid: Option<Grid>,
     sorted: Sorted,
-    record: Vec<Record>,
-    id: Vec<u32>,
-    next: Vec<[f32; 3]>,
+    coupling: Coupling,
+    spare: Agents,
+    /// Momentum that agents took by themselves in this step (kg m/s).
+    pub impulse: DVec3,
     /// Agents whose position was not finite, at the last sort.
     pub nonfinite: usize,
 }
@@ -73,12 +77,20 @@ impl Crowd {
     /// The stage. A step of length 0 decides only, as a run begins with it.
     pub fn run(&mut self, level: Level, world: &World, agents: &mut Agents, advance: Advance) {
         let flocks = &world.model.flocks;
-        if flocks.is_empty() || advance.drag > 0.0 {
+        self.impulse = DVec3::ZERO;
+        if flocks.is_empty() {
             return;
         }
-        if advance.dt > 0.0 {
-            travel(world, agents, advance.dt);
+        if advance.drag > 0.0 {
+            // while fluids settle nothing else moves
+            self.coupling = Coupling::default();
+            return agents.force.fill([0.0; 3]);
         }
+        let first = bodies::first_kick(world.model.solver.integrator, advance.dt);
+        if advance.dt > 0.0 {
+            self.impulse = travel(world, agents, advance.dt, first);
+        }
+        self.coupling.feel(world, agents, advance.dt, first);
         let due: Vec<bool> = flocks.iter().zip(&agents.clock).map(|(f, c)| c.wait <= SOON * f.tau).collect();
         if due.contains(&true) {
             take_over(flocks, &due, agents);
@@ -94,31 +106,30 @@ impl Crowd {
         self.cells.resize_with(model.flocks.len(), Cells::default);
         self.inside.clear();
         self.nonfinite = 0;
-        let n = agents.record.len();
-        self.record.resize(n, Record::default());
-        self.id.resize(n, 0);
-        self.next.resize(n, [0.0; 3]);
+        let spare = &mut self.spare;
         for (flock, cells) in model.flocks.iter().zip(&mut self.cells) {
             let range = flock.range();
-            let from = (&agents.record[range.clone()], &agents.id[range.clone()], &agents.next[range.clone()]);
-            self.inside.push(cells.sort(&grid, from.0, Some(from.1)));
+            self.inside.push(cells.sort(&grid, &agents.record[range.clone()], Some(&agents.id[range.clone()])));
             self.nonfinite += cells.nonfinite;
-            let to = self.record[range.clone()].par_chunks_mut(CHUNK);
-            let to = to.zip(self.id[range.clone()].par_chunks_mut(CHUNK)).zip(self.next[range].par_chunks_mut(CHUNK));
-            to.zip(cells.order[..flock.count].par_chunks(CHUNK)).for_each(|(((record, id), next), order)| {
-                for (k, at) in order.iter().enumerate() {
-                    let at = at.load(Relaxed) as usize;
-                    record[k] = from.0[at];
-                    id[k] = from.1[at];
-                    next[k] = from.2[at];
-                }
-            });
+            let order = &cells.order[..flock.count];
+            permute(&agents.record, &mut spare.record, range.clone(), order);
+            permute(&agents.id, &mut spare.id, range.clone(), order);
+            permute(&agents.next, &mut spare.next, range.clone(), order);
+            permute(&agents.rest, &mut spare.rest, range.clone(), order);
+            permute(&agents.force, &mut spare.force, range, order);
         }
-        std::mem::swap(&mut self.record, &mut agents.record);
-        std::mem::swap(&mut self.id, &mut agents.id);
-        std::mem::swap(&mut self.next, &mut agents.next);
+        std::mem::swap(&mut spare.record, &mut agents.record);
+        std::mem::swap(&mut spare.id, &mut agents.id);
+        std::mem::swap(&mut spare.next, &mut agents.next);
+        std::mem::swap(&mut spare.rest, &mut agents.rest);
+        std::mem::swap(&mut spare.force, &mut agents.force);
         self.sorted.fill(&agents.record);
         self.grid = Some(grid);
+    }
+
+    /// Adds what agents do to the particles around (E27, E28); bodies that are touched are `stirred`.
+    pub fn give_back(&self, model: &Model, particles: &mut Particles, stirred: &[AtomicBool]) {
+        self.coupling.give_back(model, particles, stirred);
     }
 
     /// Decides for the flocks that are due.
@@ -173,17 +184,43 @@ fn narrowest(grid: &Grid) -> f32 {
     grid.inverse.iter().filter(|i| **i > 0.0).map(|i| 0.99995 / i).fold(f32::INFINITY, f32::min)
 }
 
-/// Moves all agents.
-fn travel(world: &World, agents: &mut Agents, dt: f64) {
-    for (flock, clock) in world.model.flocks.iter().zip(&mut agents.clock) {
+/// Brings the agents `range` of an array into a new order; an array that is not used stays so.
+fn permute<T: Copy + Zeroable + Send + Sync>(from: &[T], to: &mut Vec<T>, range: Range<usize>, order: &[AtomicU32]) {
+    to.resize(from.len(), T::zeroed());
+    if from.is_empty() {
+        return;
+    }
+    let (from, to) = (&from[range.clone()], &mut to[range]);
+    to.par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK)).for_each(|(to, order)| {
+        for (to, at) in to.iter_mut().zip(order) {
+            *to = from[at.load(Relaxed) as usize];
+        }
+    });
+}
+
+/// Moves all agents, after a kick of `first` (s) by what they met; returns the momentum that they took by themselves (kg m/s).
+fn travel(world: &World, agents: &mut Agents, dt: f64, first: f64) -> DVec3 {
+    let mut impulse = DVec3::ZERO;
+    let Agents { record, next, rest, force, clock, .. } = agents;
+    for (flock, clock) in world.model.flocks.iter().zip(clock) {
         let range = flock.range();
-        agents.record[range.clone()]
-            .par_chunks_mut(CHUNK)
-            .zip(agents.next[range].par_chunks_mut(CHUNK))
-            .for_each(|(records, next)| motion::chunk(world, flock, dt, records, next));
+        let forces = &force[if force.is_empty() { 0..0 } else { range.clone() }];
+        let record = record[range.clone()].par_chunks_mut(CHUNK);
+        let arrays = record.zip(next[range.clone()].par_chunks_mut(CHUNK)).zip(rest[range].par_chunks_mut(CHUNK));
+        let moved = arrays.enumerate().map(|(c, ((record, next), rest))| {
+            let force = forces.get(c * CHUNK..).unwrap_or(&[]);
+            motion::chunk(world, flock, dt, first, Part { record, next, rest, force })
+        });
+        if flock.matter.is_some() {
+            // in the order of chunks
+            impulse += moved.collect::<Vec<DVec3>>().into_iter().sum::<DVec3>();
+        } else {
+            moved.for_each(|_| {});
+        }
         clock.time += dt;
         clock.wait -= dt;
     }
+    impulse
 }
 
 /// The clocks of flocks that are due go on, and Vicsek's agents take over what they decided last (E24).

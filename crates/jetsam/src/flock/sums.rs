@@ -126,9 +126,15 @@ fn reynolds<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, u
     let near_limit = f32x16::splat(simd, near_sq);
     let align_sq = square(rule.alignment_radius, unbounded);
     let draw_sq = square(rule.cohesion_radius, unbounded);
+    let far_limit = f32x16::splat(simd, near_sq.max(align_sq).max(draw_sq));
     for b in 0..tile.blocks() {
         let block = tile.block(b);
         let (d, r_sq) = apart(me, &block);
+        let distances = f32x16::load_array_ref(simd, &r_sq);
+        // one vector in four has nobody in reach
+        if !distances.simd_lt(far_limit).any_true() {
+            continue;
+        }
         let mut aligned = [0.0; LANES];
         for l in 0..LANES {
             aligned[l] = flock::within(r_sq[l], align_sq);
@@ -154,7 +160,7 @@ fn reynolds<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, u
             wide.drawn[l] += drawn[l];
         }
         // few are near: most vectors are spared the division
-        if f32x16::load_array_ref(simd, &r_sq).simd_lt(near_limit).any_true() {
+        if distances.simd_lt(near_limit).any_true() {
             let mut push = [0.0; LANES];
             for l in 0..LANES {
                 let weight = flock::separation(r_sq[l], rule.separation_radius) * flock::within(r_sq[l], near_sq);

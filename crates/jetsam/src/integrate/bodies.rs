@@ -14,7 +14,7 @@ const PART: usize = 1024;
 const ROUNDS: usize = 6;
 
 /// Length of the kick before the drift (s).
-fn first_kick(integrator: Integrator, dt: f64) -> f64 {
+pub(crate) fn first_kick(integrator: Integrator, dt: f64) -> f64 {
     match integrator {
         Integrator::Leapfrog => 0.5 * dt,
         Integrator::Euler => dt,

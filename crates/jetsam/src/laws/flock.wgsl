@@ -1,4 +1,4 @@
-// E22-E26: flocks. d = x_j - x_i from the agent that perceives to the one perceived; v_i, v_j velocities.
+// E22-E27: flocks. d = x_j - x_i from the agent that perceives to the one perceived; v_i, v_j velocities.
 // Weights are pure numbers; the caller brings a speed U and a radius R, and T = R / U makes rates of them.
 
 fn unit(v: vec3<f32>) -> vec3<f32> {
@@ -94,6 +94,14 @@ fn couzin(repelled: vec3<f32>, oriented: vec3<f32>, attracted: vec3<f32>, headin
   if (near > 1e-12) { return unit(repelled); }
   if (dot(far, far) > 1e-12) { return unit(far); }
   return heading;
+}
+
+// E27: drag on an agent that moves at u through fluid of this density. half_area = C_d A / 2; time = dt (1 / m + 1 / M), the step and the
+// masses of agent and fluid, which together must not turn round: beyond what a step can take the force is cut, to second order.
+fn drag(u: vec3<f32>, density: f32, half_area: f32, time: f32) -> vec3<f32> {
+  let rate = half_area * density * length(u);
+  let part = rate * time;
+  return u * (-rate / (1.0 + part * part));
 }
 
 // E23, E24: a unit direction turned by an angle (given by its cosine and sine) towards the unit vector `axis`, which is normal to it.

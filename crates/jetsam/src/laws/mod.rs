@@ -60,7 +60,7 @@ law_file!(
     "src/laws/field.wgsl"
 );
 law_file!(
-    /// E22-E24, E26, flocks (`laws/flock.wgsl`).
+    /// E22-E24, E26, E27, flocks (`laws/flock.wgsl`).
     flock,
     "src/laws/flock.wgsl"
 );

@@ -2,6 +2,7 @@
 
 use super::{constant, find, level, places, sums};
 use crate::error::Result;
+use crate::flock::Order;
 use crate::formula::{Expression, Scope};
 use crate::scene::{Component, End, Norm, Of, Probe, Scene};
 use crate::world::World;
@@ -38,6 +39,7 @@ pub(super) enum Subject {
     All,
     Fluid(usize),
     Body(usize),
+    Flock(usize),
 }
 
 /// A probe with every name and formula resolved.
@@ -162,6 +164,10 @@ impl Meter {
             Of::DensityErrorMax => ledger.density_error_max,
             Of::Lost => (ledger.lost + ledger.rigid_lost as u64) as f64,
             Of::Left => ledger.left as f64,
+            Of::Polarization | Of::Milling | Of::Fragments | Of::LargestFragment => match self.subject {
+                Subject::Flock(f) => order(self.of, &world.flock_order(f)),
+                _ => f64::NAN,
+            },
             Of::Steps => world.steps() as f64,
             Of::Dt => world.model().largest_dt(ledger.speed, ledger.acceleration).0,
             Of::Spin
@@ -186,6 +192,16 @@ impl Meter {
     }
 }
 
+/// An order parameter.
+fn order(of: Of, order: &Order) -> f64 {
+    match of {
+        Of::Polarization => order.polarization,
+        Of::Milling => order.milling,
+        Of::LargestFragment => order.largest,
+        _ => order.fragments as f64,
+    }
+}
+
 /// A component of a vector.
 pub(super) fn component(v: DVec3, component: Component) -> f64 {
     match component {
@@ -204,6 +220,10 @@ fn subject(scene: &Scene, world: &World, p: &Probe, index: usize) -> Result<Subj
     if let Some(name) = &p.fluid {
         let names = world.model().fluids.iter().map(|f| f.name.as_str());
         return Ok(Subject::Fluid(find(scene, &format!("probe.{index}.fluid"), "fluid", name, names)?));
+    }
+    if let Some(name) = &p.flock {
+        let names = world.model().flocks.iter().map(|f| f.name.as_str());
+        return Ok(Subject::Flock(find(scene, &format!("probe.{index}.flock"), "flock", name, names)?));
     }
     Ok(Subject::All)
 }
@@ -237,6 +257,7 @@ fn keys(of: Of) -> (&'static [&'static str], &'static [&'static str]) {
         }
         Of::KernelIntegral | Of::KernelSum | Of::KernelGradientSum | Of::KernelNeighbours => (&[], KERNEL),
         Of::ContactStiffness | Of::ContactDamping => (&["body"], &["body", "other"]),
+        Of::Polarization | Of::Milling | Of::Fragments | Of::LargestFragment => (&["flock"], &["flock"]),
         Of::Formula => (&["formula"], &["formula"]),
         _ => (&[], &[]),
     }
@@ -252,6 +273,7 @@ pub(super) fn check_keys(scene: &Scene, index: usize, p: &Probe) -> Result<()> {
         ("fluid", p.fluid.is_some()),
         ("body", p.body.is_some()),
         ("other", p.other.is_some()),
+        ("flock", p.flock.is_some()),
         ("component", p.component.is_some()),
         ("end", p.end != End::Max),
         ("percentile", p.percentile != crate::params::default::percentile()),

@@ -4,7 +4,7 @@ use super::meter::{Meter, Place, Subject, component};
 use super::places::way;
 use crate::interact::pressure::pressure;
 use crate::scene::{Component, End, EquationOfState, Force, Of};
-use crate::state::{Body, Kind};
+use crate::state::{Body, Kind, Record};
 use crate::world::World;
 use glam::DVec3;
 use std::collections::HashMap;
@@ -28,7 +28,7 @@ pub(super) fn particles<'a>(meter: &'a Meter, world: &'a World) -> impl Iterator
         let owner = p.owner[i];
         match meter.subject {
             Subject::Fluid(f) if f != owner as usize => return None,
-            Subject::Body(_) => return None,
+            Subject::Body(_) | Subject::Flock(_) => return None,
             _ => {}
         }
         let r = &p.record[i];
@@ -55,27 +55,44 @@ fn bodies<'a>(meter: &Meter, world: &'a World) -> impl Iterator<Item = &'a Body>
     let all = world.state().bodies.body.iter().enumerate();
     let looked_at = all.filter(move |(i, _)| match subject {
         Subject::All => true,
-        Subject::Fluid(_) => false,
+        Subject::Fluid(_) | Subject::Flock(_) => false,
         Subject::Body(b) => b == *i,
     });
     looked_at.map(|(_, b)| b).filter(|b| !b.is_static())
 }
 
+/// Agents of mass (kg), where a probe looks at everything.
+fn agents<'a>(meter: &Meter, world: &'a World) -> impl Iterator<Item = (f64, &'a Record)> + 'a {
+    let all = meter.subject == Subject::All;
+    let flocks = world.model().flocks.iter().filter(move |_| all);
+    flocks
+        .filter_map(|f| Some((f64::from(f.matter.as_ref()?.mass), f.range())))
+        .flat_map(|(mass, range)| world.state().agents.record[range].iter().map(move |r| (mass, r)))
+}
+
+fn double(v: [f32; 3]) -> DVec3 {
+    DVec3::from(v.map(f64::from))
+}
+
 /// Mass (kg).
 pub(super) fn mass(meter: &Meter, world: &World) -> f64 {
-    particles(meter, world).map(|p| p.mass).sum::<f64>() + bodies(meter, world).map(|b| b.mass).sum::<f64>()
+    particles(meter, world).map(|p| p.mass).sum::<f64>()
+        + bodies(meter, world).map(|b| b.mass).sum::<f64>()
+        + agents(meter, world).map(|(mass, _)| mass).sum::<f64>()
 }
 
 /// Momentum (kg m/s).
 pub(super) fn momentum(meter: &Meter, world: &World) -> DVec3 {
     let fluid = particles(meter, world).fold(DVec3::ZERO, |s, p| s + p.mass * p.v);
-    bodies(meter, world).fold(fluid, |s, b| s + b.mass * b.v)
+    let agents = agents(meter, world).fold(fluid, |s, (mass, r)| s + mass * double(r.v));
+    bodies(meter, world).fold(agents, |s, b| s + b.mass * b.v)
 }
 
 /// Centre of mass (m).
 pub(super) fn center(meter: &Meter, world: &World) -> DVec3 {
     let fluid = particles(meter, world).fold(DVec3::ZERO, |s, p| s + p.mass * p.x);
-    bodies(meter, world).fold(fluid, |s, b| s + b.mass * b.x) / mass(meter, world)
+    let agents = agents(meter, world).fold(fluid, |s, (mass, r)| s + mass * double(r.x));
+    bodies(meter, world).fold(agents, |s, b| s + b.mass * b.x) / mass(meter, world)
 }
 
 /// Angular momentum about the probe's point, and the sum of `m |r| |v|` (kg m^2/s).
@@ -91,6 +108,11 @@ pub(super) fn angular_momentum(meter: &Meter, world: &World) -> (DVec3, f64) {
         sum.0 += b.mass * r.cross(b.v) + b.l;
         sum.1 += b.mass * r.length() * b.v.length() + b.l.length();
     }
+    for (mass, a) in agents(meter, world) {
+        let (r, v) = (double(a.x) - meter.about, double(a.v));
+        sum.0 += mass * r.cross(v);
+        sum.1 += mass * r.length() * v.length();
+    }
     sum
 }
 
@@ -98,7 +120,8 @@ pub(super) fn angular_momentum(meter: &Meter, world: &World) -> (DVec3, f64) {
 pub(super) fn kinetic(meter: &Meter, world: &World) -> f64 {
     let fluid: f64 = particles(meter, world).map(|p| 0.5 * p.mass * p.v.length_squared()).sum();
     let turning = |b: &Body| 0.5 * (b.mass * b.v.length_squared() + b.l.dot(b.omega));
-    fluid + bodies(meter, world).map(turning).sum::<f64>()
+    let agents: f64 = agents(meter, world).map(|(mass, r)| 0.5 * mass * double(r.v).length_squared()).sum();
+    fluid + agents + bodies(meter, world).map(turning).sum::<f64>()
 }
 
 /// Potential energy in gravity and in point fields (J).

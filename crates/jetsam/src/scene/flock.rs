@@ -93,8 +93,8 @@ pub struct Flock {
     /// How far behind the leader they stay, and ahead of it they give way; `R` when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub follow_distance: Option<f64>,
-    /// What they do about other flocks, by name; also about `bodies` and `fluids`. Their own kind they school with, all else they
-    /// ignore.
+    /// What they do about other flocks, by name; also about `bodies` (flee) and `fluids` (flee, or school: stay in them). Their own
+    /// kind they school with, all else they ignore.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub meets: BTreeMap<String, Relation>,
     /// Weight of fleeing.
@@ -119,7 +119,14 @@ pub struct Flock {
     /// Time between decisions; when absent 1 s for Vicsek, 0.1 s for Couzin, every step for Reynolds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tau: Option<f64>,
-    /// Radius of an agent.
+    /// Mass of an agent. Agents that have one are dragged by fluids (E27) and pushed by bodies (E28), and push them; they carry their own
+    /// weight. The others only look.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    /// Coefficient of drag `C_d` of agents that have a mass; 0.5 when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drag: Option<f64>,
+    /// Radius of an agent: how close its centre comes to walls and bodies, and with `mass` its cross-section.
     #[serde(default = "d::flock_size")]
     pub size: f64,
 }

@@ -36,6 +36,9 @@ pub struct Probe {
     /// Name of the other body of a contact; without it a body's like.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub other: Option<String>,
+    /// Name of a flock.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flock: Option<String>,
     /// Which component of a vector: by default its magnitude. `w` is for a quaternion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub component: Option<Component>,
@@ -206,6 +209,14 @@ pub enum Of {
     ContactStiffness,
     /// Dashpot of one contact of `body` and `other` (N s/m).
     ContactDamping,
+    /// Length of the mean of the headings of a `flock`: 1 when all fly one way.
+    Polarization,
+    /// Length of the mean of `r x v` of a `flock`, both as unit vectors, r from its centre: 1 when all circle it.
+    Milling,
+    /// Parts of a `flock` between which nobody perceives anybody.
+    Fragments,
+    /// Part of a `flock` that the largest of them has.
+    LargestFragment,
     /// A `formula` of other probes.
     Formula,
 }
