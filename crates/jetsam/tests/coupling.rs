@@ -73,3 +73,16 @@ fn fluid_is_carved_where_bodies_stand() {
     let center = glam::Vec3::new(0.25, 0.25, 0.15);
     assert!(p.segment(Kind::Fluid).all(|i| (glam::Vec3::from(p.record[i].x) - center).length() > 0.095));
 }
+
+#[test]
+fn no_fluid_begins_inside_a_static_body_behind_its_skin() {
+    // only a skin of a body that does not move has particles: two of the eight layers here
+    let w = world(
+        "[world]\ndimensions = 2\n[domain]\nmin = [0, 0, 0]\nmax = [0.5, 0, 0.5]\n[resolution]\nspacing = 0.0125\n\
+         [[fluid]]\nshape = { box = { min = [0, 0, 0], max = [0.5, 0, 0.4] } }\n\
+         [[static]]\nshape = { sphere = { center = [0, 0, 0], radius = 0.1 } }\nposition = [0.25, 0, 0.2]\n",
+    );
+    let p = &w.state().particles;
+    let center = glam::Vec3::new(0.25, 0.0, 0.2);
+    assert!(p.segment(Kind::Fluid).all(|i| (glam::Vec3::from(p.record[i].x) - center).length() > 0.095));
+}

@@ -196,6 +196,7 @@ impl Scene {
                 })
                 .collect();
             body.normal = kept.iter().map(|&k| normals[k]).collect();
+            body.core = body.offset.clone();
             body.offset = kept.iter().map(|&k| body.offset[k]).collect();
             body.friction = fixed.friction;
             if body.offset.is_empty() {
@@ -276,6 +277,8 @@ impl Scene {
 pub(super) struct NewBody {
     pub(super) name: String,
     pub(super) offset: Vec<DVec3>,
+    /// Particles of the whole shape, where `offset` is its skin alone: no fluid begins inside.
+    pub(super) core: Vec<DVec3>,
     pub(super) particle_volume: Vec<f64>,
     pub(super) x: DVec3,
     pub(super) q: DQuat,
@@ -316,6 +319,7 @@ impl NewBody {
         Self {
             name,
             offset: points,
+            core: Vec::new(),
             particle_volume: Vec::new(),
             x: DVec3::ZERO,
             q: DQuat::IDENTITY,
@@ -336,6 +340,11 @@ impl NewBody {
 
     pub(super) fn points(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.offset.iter().map(|o| self.x + self.q * *o)
+    }
+
+    /// Where no fluid can begin: the particles, and what stands behind the skin.
+    pub(super) fn takes(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.points().chain(self.core.iter().map(|o| self.x + self.q * *o))
     }
 }
 

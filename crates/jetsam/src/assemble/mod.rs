@@ -73,7 +73,7 @@ impl Scene {
         }
         let mut carver = Near::new(CARVE * spacing);
         for body in &bodies {
-            for p in body.points() {
+            for p in body.takes() {
                 carver.insert(p);
             }
         }
