@@ -113,7 +113,6 @@ fn one_alone_flies_straight() {
         w.advance(30.0, |_, _| true);
         let a = agents(&w)[0];
         let expected = Vec3::new(1.0, 2.0, 3.0) + 60.0 * Vec3::new(1.0, 2.0, 2.0) / 3.0;
-        println!("straight {:e}", (x(&a) - expected).length());
         assert!((x(&a) - expected).length() < 1e-6 * 60.0, "{model}: {}", x(&a));
     }
 }
@@ -163,15 +162,13 @@ fn turning_moving_or_renumbering_a_flock_changes_nothing_else() {
     let reversed = changed(|a| a.state.agents.record.reverse());
     for (k, p) in plain.iter().enumerate() {
         let error = |r: &Record, place: Vec3, velocity: Vec3| (x(r) - place).length().max((v(r) - velocity).length());
-        // a few units in the last place of coordinates of three metres, after five steps
+        // a millionth of the three metres that the flock reaches
         let e = error(&turned[k], turn * x(p), turn * v(p));
-        println!("turned {e:e}");
-        assert!(e < 1e-5, "turned: {k} is off by {e}");
+        assert!(e < 3e-6, "turned: {k} is off by {e}");
         let e = error(&moved[k], x(p) + by, v(p));
-        println!("moved {e:e}");
-        assert!(e < 1e-5, "moved: {k} is off by {e}");
+        assert!(e < 3e-6, "moved: {k} is off by {e}");
         let e = error(&reversed[plain.len() - 1 - k], x(p), v(p));
-        assert!(e < 1e-5, "renumbered: {k} is off by {e}");
+        assert!(e < 3e-6, "renumbered: {k} is off by {e}");
     }
 }
 
@@ -302,11 +299,11 @@ fn couzin(orientation: f64, attraction: f64, seed: u64, steps: u32) -> (f64, f64
         w.step(f64::INFINITY);
     }
     let (mut p, mut m) = (0.0, 0.0);
-    for _ in 0..500 {
+    for _ in 0..1000 {
         w.step(f64::INFINITY);
         let order = w.flock_order(0);
-        p += order.polarization / 500.0;
-        m += order.milling / 500.0;
+        p += order.polarization / 1000.0;
+        m += order.milling / 1000.0;
     }
     (p, m, w.flock_order(0).fragments)
 }
@@ -315,7 +312,7 @@ fn couzin(orientation: f64, attraction: f64, seed: u64, steps: u32) -> (f64, f64
 fn couzin_swarms_mill_and_fly_parallel() {
     // one run of each regime; the tolerances are those of D2
     for (orientation, p, m) in [(1.0, Some(0.095), Some(0.882)), (6.0, Some(0.999), None)] {
-        let (got_p, got_m, _) = couzin(orientation, 14.0, 1, 3000);
+        let (got_p, got_m, _) = couzin(orientation, 14.0, 1, 4000);
         println!("orientation {orientation}: p {got_p:.3} m {got_m:.3}");
         assert!(p.is_none_or(|p: f64| (got_p - p).abs() < 0.03), "{orientation}: p = {got_p}");
         assert!(m.is_none_or(|m: f64| (got_m - m).abs() < 0.05), "{orientation}: m = {got_m}");

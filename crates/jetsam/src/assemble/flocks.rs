@@ -125,7 +125,7 @@ impl Scene {
                 ));
             }
         }
-        if flock.drag.is_some() && flock.mass.is_none() {
+        if flock.drag != crate::params::default::flock_drag() && flock.mass.is_none() {
             let message = format!("`{key}.drag` has no meaning without a mass: nothing pushes these agents");
             return Err(self.error(&format!("{key}.drag"), message, "give the agents a mass, or leave drag out"));
         }

@@ -141,7 +141,6 @@ impl FlockConstants {
         let constant = f.model != FlockModel::Reynolds;
         let is = |key: &str, relation| f.meets.get(key) == Some(&relation);
         let section = if dimensions == 2 { 2.0 * f.size } else { std::f64::consts::PI * f.size * f.size };
-        let drag = f.drag.unwrap_or_else(crate::params::default::flock_drag);
         Self {
             name: name(flock),
             model: f.model,
@@ -177,7 +176,7 @@ impl FlockConstants {
             goal: f.goal.map(|g| (DVec3::from(g).as_vec3(), f.arrive as f32)),
             leader: leader.map(|l| (l, or(f.follow_distance, r))),
             relations,
-            matter: f.mass.map(|m| Matter { mass: m as f32, half_area: (0.5 * drag * section) as f32 }),
+            matter: f.mass.map(|m| Matter { mass: m as f32, half_area: (0.5 * f.drag * section) as f32 }),
             keep_to_fluids: is("fluids", Relation::School),
             flee_bodies: is("bodies", Relation::Flee),
             flee_fluids: is("fluids", Relation::Flee),

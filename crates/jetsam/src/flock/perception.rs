@@ -170,6 +170,7 @@ impl Tile {
     /// Packs the agents of a flock (its cells, its first agent) in the cells up to `far` cells from `cell`; periodic images are shifted
     /// into place.
     #[inline(always)]
+    #[allow(clippy::too_many_arguments)] // one caller
     pub fn pack<S: Simd>(
         &mut self,
         simd: S,

@@ -123,9 +123,9 @@ pub struct Flock {
     /// weight. The others only look.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
-    /// Coefficient of drag `C_d` of agents that have a mass; 0.5 when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub drag: Option<f64>,
+    /// Coefficient of drag `C_d` of agents that have a mass.
+    #[serde(default = "d::flock_drag")]
+    pub drag: f64,
     /// Radius of an agent: how close its centre comes to walls and bodies, and with `mass` its cross-section.
     #[serde(default = "d::flock_size")]
     pub size: f64,
