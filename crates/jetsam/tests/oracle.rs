@@ -85,10 +85,8 @@ fn oracle(particles: &[P], assembly: &Assembly, period: DVec3) -> Oracle {
     let mut seen: Vec<DVec3> = particles.iter().map(|p| p.v).collect();
     let (mut share, mut signed) = (vec![0.0; n], vec![0.0; n]);
     for (i, p) in particles.iter().enumerate().filter(|(_, p)| p.kind == Kind::Fluid) {
-        density[i] = match integrated {
-            true => p.density,
-            false => particles.iter().map(|q| q.volume * w(apart(p, q).length())).sum(),
-        };
+        let summed: f64 = particles.iter().map(|q| q.volume * w(apart(p, q).length())).sum();
+        density[i] = if integrated { p.density.max(summed - 0.03) } else { summed };
         signed[i] = stiffness / 7.0 * (density[i].powi(7) - 1.0) / density[i].powi(2);
         share[i] = signed[i].max(0.0);
     }

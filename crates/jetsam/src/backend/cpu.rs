@@ -375,7 +375,8 @@ impl Cpu {
     fn pressure(&mut self, model: &Model) {
         let p = &mut self.state.particles;
         let fluid = p.segment(Kind::Fluid);
-        if model.solver.density == Density::Continuity {
+        // where fluids bear tension, a density that lags behind pulls them back by itself
+        if model.solver.density == Density::Continuity && !model.solver.negative_pressure {
             let summed = self.summed[fluid.clone()].par_chunks(CHUNK);
             chunks_mut!(p.density, fluid.clone()).zip(summed).for_each(|(d, s)| pressure::hold(d, s));
         }
