@@ -111,6 +111,7 @@ fn run_writes_what_the_contract_says() {
     }
     for (n, line) in lines.iter().enumerate() {
         assert_keys(line, keys);
+        assert_eq!(line.as_object().unwrap().len(), keys.split_whitespace().count(), "{line}");
         assert_eq!(line["frame"], n);
         assert!((line["time"].as_f64().unwrap() - 0.02 * n as f64).abs() < 1e-12);
         assert_eq!(line["momentum"].as_array().unwrap().len(), 3);

@@ -34,8 +34,6 @@ pub struct FrameStats {
     pub agents: usize,
     /// Fluid particles that got through a solid wall since the beginning, and particles of bodies that are now beyond one.
     pub lost: u64,
-    /// Times a body came so deep into another, or so fast, that it could have passed through, since the beginning.
-    pub fast_contacts: u64,
     /// Particles and bodies found with a value that is not finite, since the beginning.
     pub nonfinite: u64,
     /// Mean of `|rho / rho_0 - 1|` over fluid particles with full support.
@@ -114,7 +112,6 @@ impl Recorder {
             bodies: rigid_bodies(world.state()),
             agents: world.state().agents.record.len(),
             lost: ledger.lost + ledger.rigid_lost as u64,
-            fast_contacts: ledger.fast_contacts,
             nonfinite: ledger.nonfinite,
             density_error_mean: ledger.density_error_mean,
             density_error_max: ledger.density_error_max,

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-const HEADER: &str = "time,flock,n,polarization,milling,fragments,largest";
+const HEADER: &str = "time,flock,n,polarization,milling";
 
 /// The open file.
 pub struct FlocksCsv {
@@ -28,8 +28,7 @@ impl Writer for FlocksCsv {
     fn write(&mut self, world: &World, _: &FrameStats) -> miette::Result<()> {
         for flock in 0..world.model().flocks.len() {
             let o = world.flock_order(flock);
-            let order = format!("{},{},{},{},{}", o.n, o.polarization, o.milling, o.fragments, o.largest);
-            let line = writeln!(self.file, "{},{flock},{order}", world.time());
+            let line = writeln!(self.file, "{},{flock},{},{},{}", world.time(), o.n, o.polarization, o.milling);
             line.map_err(at(&self.path))?;
         }
         Ok(self.file.flush().map_err(at(&self.path))?)
