@@ -1,5 +1,5 @@
-//! **jetsam** drops meshes into water: one world of particles for rigid bodies and fluids, every kind acting on
-//! every other.
+//! **jetsam** drops meshes into water: one world of particles for rigid bodies, fluids and flocks, every kind
+//! acting on every other.
 //!
 //! It takes up the system of Young and Erlebacher, "Particle Systems for Real-Time Rigid-body, Fluid, and Flocking
 //! simulations": a triangle mesh becomes particles ([`voxelize`]), forces act between particles ([`interact`]) and are
@@ -24,12 +24,14 @@
 //! | stage | what it does | where |
 //! |---|---|---|
 //! | drift | half a kick; particles and bodies move (E20, E21) | [`integrate`] |
+//! | sources | fluid born and drained (E31) | [`integrate::sources`] |
 //! | cells | particles sorted into cells as wide as the support | [`interact::cells`] |
 //! | density | neighbours, found once; densities (E1) | [`interact::density`] |
 //! | pressure | equation of state (E3) | [`interact::pressure`] |
 //! | boundary | what fluids show to bodies and walls (E17) | [`interact::boundary`] |
-//! | forces | all pairs (E4-E6, E10-E12, E16, E30) | [`interact::forces`] |
-//! | agents | flocks move and decide (E22-E26) | [`mod@flock`] |
+//! | gradients | colour gradients and vorticities, where asked for (E7, E8) | [`interact::gradients`] |
+//! | forces | all pairs (E4-E8, E10-E13, E16, E30) | [`interact::forces`] |
+//! | agents | flocks move and decide (E22-E28) | [`mod@flock`] |
 //! | bodies | force and torque of each body (E18) | [`integrate::bodies`] |
 //! | kick | the second half of the kick (E20) | [`integrate`] |
 //! | ledger | momentum, energy, what was lost, what bounds the next step | [`ledger`] |
