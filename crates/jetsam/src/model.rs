@@ -7,7 +7,7 @@ use crate::laws::kernel::{Kernel, KernelSet};
 use crate::scene::joint::JointModel;
 use crate::scene::motion::{Path, Shake};
 use crate::scene::{Density, Force, Solver, Viscosity};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::f64::consts::PI;
 
 /// Contacts are looked for within so many contact diameters: farther than a pair parts or meets in half a step.
@@ -316,11 +316,6 @@ impl Model {
     /// Whether colour gradients or vorticities are wanted (E7, E8).
     pub fn wants_gradients(&self) -> bool {
         self.fluids.iter().any(|f| f.curvature > 0.0) || self.solver.vorticity > 0.0
-    }
-
-    /// Gravity in single precision.
-    pub fn gravity_f32(&self) -> Vec3 {
-        self.gravity.as_vec3()
     }
 
     /// Spring constant (N/m) and dashpot (N s/m) of one contact between particles of bodies `a` and `b` (E14).

@@ -235,27 +235,15 @@ fn vicsek(n: usize, size: f64, noise: f64, warm: u32, steps: u32) -> (f64, f64) 
     (mean, (variance / 10.0).sqrt())
 }
 
-/// D1: noise, and the order parameter for 40, 100 and 400 agents (Vicsek et al. 1995; reference computed from the exact rule).
-const VICSEK: [(f64, [f64; 3]); 11] = [
-    (0.5, [0.9892, 0.9881, 0.9866]),
-    (1.0, [0.9576, 0.9539, 0.9483]),
-    (1.5, [0.9057, 0.8967, 0.8827]),
-    (2.0, [0.8354, 0.8224, 0.795]),
-    (2.5, [0.7506, 0.7271, 0.687]),
-    (3.0, [0.6521, 0.6183, 0.560]),
-    (3.5, [0.5433, 0.4945, 0.449]),
-    (4.0, [0.4272, 0.3640, 0.269]),
-    (4.5, [0.3009, 0.2255, 0.153]),
-    (5.0, [0.2043, 0.1311, 0.070]),
-    (std::f64::consts::TAU, [0.1403, 0.0886, 0.0443]),
-];
+/// D1: noise, and the order parameter (Vicsek et al. 1995; for 40 agents; reference computed from the exact rule).
+const VICSEK: [(f64, f64); 3] = [(1.0, 0.9576), (2.0, 0.8354), (std::f64::consts::TAU, 0.1403)];
 
 #[test]
 fn vicsek_order_falls_with_noise() {
-    for (noise, reference) in [VICSEK[1], VICSEK[3], VICSEK[10]] {
+    for (noise, reference) in VICSEK {
         let (got, error) = vicsek(40, 3.1, noise, 500, 20_000);
-        println!("eta {noise:.3}: {got:.4} +- {error:.4}, reference {}", reference[0]);
-        assert!((got - reference[0]).abs() < f64::max(0.01, 3.0 * error), "{noise}: {got}, not {}", reference[0]);
+        println!("eta {noise:.3}: {got:.4} +- {error:.4}, reference {reference}");
+        assert!((got - reference).abs() < f64::max(0.01, 3.0 * error), "{noise}: {got}, not {reference}");
     }
 }
 
@@ -263,23 +251,6 @@ fn vicsek_order_falls_with_noise() {
 fn vicsek_without_noise_ends_in_full_order() {
     let (got, _) = vicsek(100, 5.0, 0.0, 400, 100);
     assert!(got > 1.0 - 1e-5, "{got}");
-}
-
-#[test]
-#[ignore = "minutes: the whole table of D1"]
-fn vicsek_table() {
-    for (noise, reference) in VICSEK {
-        let runs = [(40, 3.1, 500, 100_000), (100, 5.0, 1000, 60_000), (400, 10.0, 2000, 40_000)];
-        let mut got = [0.0; 3];
-        for (k, (n, size, warm, steps)) in runs.into_iter().enumerate() {
-            let (mean, error) = vicsek(n, size, noise, warm, steps);
-            got[k] = mean;
-            let tolerance = f64::max(3.0 * error, [0.01, 0.01, 0.03][k]);
-            println!("eta {noise:.3} N {n}: {mean:.4} +- {error:.4}, reference {:.4}", reference[k]);
-            assert!((mean - reference[k]).abs() < tolerance, "eta {noise}, N {n}: {mean}, not {}", reference[k]);
-        }
-        assert!(noise < 1.0 || got[0] > got[1] && got[1] > got[2], "eta {noise}: {got:?} do not fall with size");
-    }
 }
 
 /// Mean polarization and milling of Couzin's agents (D2), and their fragments at the end.
@@ -351,14 +322,6 @@ fn among_obstacles(steps: u32) -> (f32, usize) {
 
 #[test]
 fn agents_enter_no_obstacle() {
-    let (deepest, outside) = among_obstacles(300);
-    println!("nearest to a surface: {:.4} m", -deepest);
-    assert!(deepest < 0.0 && outside == 0, "{deepest} m deep, {outside} outside");
-}
-
-#[test]
-#[ignore = "a minute: 10,000 steps"]
-fn agents_enter_no_obstacle_for_long() {
     let (deepest, outside) = among_obstacles(10_000);
     println!("nearest to a surface: {:.4} m", -deepest);
     assert!(deepest < 0.0 && outside == 0, "{deepest} m deep, {outside} outside");

@@ -480,7 +480,8 @@ impl Cpu {
                     dt,
                     fastest,
                 };
-                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, push, carry, vorticity, touch));
+                let out = forces::Output { push, carry, vorticity, touch };
+                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, out));
             };
             if kind != Kind::Fluid {
                 let touch = p.touch[first - bodies_first..].par_chunks_mut(CHUNK);

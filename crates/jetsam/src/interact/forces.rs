@@ -43,39 +43,32 @@ pub struct Input<'a> {
     pub fastest: f32,
 }
 
-/// Forces on a chunk of particles of one kind. `carry` may be empty.
+/// What the stage writes of a chunk. What a kind has not, or nobody asks for, is empty.
+pub struct Output<'a> {
+    /// Acceleration of fluids (m/s^2), force on bodies' particles (N).
+    pub push: &'a mut [[f32; 3]],
+    /// Velocity by which fluids are carried besides their own (m/s), and `dD/dt` (1/s).
+    pub carry: &'a mut [[f32; 4]],
+    /// In: `curl v` of fluids (1/s). Out: the acceleration of confinement (m/s^2).
+    pub vorticity: &'a mut [[f32; 3]],
+    /// Of what the forces on bodies' particles consist.
+    pub touch: &'a mut [Touch],
+}
+
+/// Forces on a chunk of particles of one kind.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)] // one caller
-pub fn chunk<S: Simd>(
-    simd: S,
-    input: Input,
-    kind: Kind,
-    chunk: &NeighbourChunk,
-    push: &mut [[f32; 3]],
-    carry: &mut [[f32; 4]],
-    vorticity: &mut [[f32; 3]],
-    touch: &mut [Touch],
-) {
+pub fn chunk<S: Simd>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: Output) {
     // most scenes ask for no more than pressure and viscosity: the rest is then not even compiled in
     if input.model.plain() && input.mirror.is_empty() {
-        particles::<S, true>(simd, input, kind, chunk, push, carry, vorticity, touch);
+        particles::<S, true>(simd, input, kind, chunk, out);
     } else {
-        particles::<S, false>(simd, input, kind, chunk, push, carry, vorticity, touch);
+        particles::<S, false>(simd, input, kind, chunk, out);
     }
 }
 
 #[inline(always)]
-#[allow(clippy::too_many_arguments)] // one caller
-fn particles<S: Simd, const PLAIN: bool>(
-    simd: S,
-    input: Input,
-    kind: Kind,
-    chunk: &NeighbourChunk,
-    push: &mut [[f32; 3]],
-    carry: &mut [[f32; 4]],
-    vorticity: &mut [[f32; 3]],
-    touch: &mut [Touch],
-) {
+fn particles<S: Simd, const PLAIN: bool>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: Output) {
+    let Output { push, carry, vorticity, touch } = out;
     let listed = Listed::new(simd, input.records, chunk.list());
     for (k, runs) in chunk.runs.iter().enumerate() {
         let i = input.first + k;

@@ -127,7 +127,7 @@ impl<'a> Pairs<'a> {
         let solver = &model.solver;
         let continuity = fluid.filter(|_| solver.density == Density::Continuity).map(|f| {
             let f = &model.fluids[f as usize];
-            Diffusion { rate: f.diffusion, stiffness: f.stiffness, pull: f.density * model.gravity_f32() }
+            Diffusion { rate: f.diffusion, stiffness: f.stiffness, pull: f.density * input.gravity }
         });
         Self {
             model,
