@@ -28,6 +28,13 @@ pub enum GpuError {
         help("build it with the feature `gpu`, which is on by default, or use the backend `cpu`")
     )]
     NotBuilt,
+    /// The scene asks for what only the processor does.
+    #[error("{what} run on the processor only")]
+    #[diagnostic(code(jetsam::gpu::scene), help("use `--backend cpu`, or `auto`, which chooses it by itself"))]
+    Scene {
+        /// What it asks for.
+        what: &'static str,
+    },
     /// The driver would not open the device, or refused a command.
     #[error("{device} refused to work: {reason}")]
     #[diagnostic(code(jetsam::gpu::refused), help("update the graphics driver, or use the backend `cpu`"))]

@@ -233,9 +233,9 @@ impl DtBound {
 }
 
 /// Tangential over normal spring of a contact: both then last equally long for a ball (Schaefer, Dippel and Wolf 1996).
-const TANGENTIAL: f32 = 2.0 / 7.0;
+pub(crate) const TANGENTIAL: f32 = 2.0 / 7.0;
 /// Damping ratio of the tangential spring (E13).
-const TANGENTIAL_DAMPING: f32 = 0.3;
+pub(crate) const TANGENTIAL_DAMPING: f32 = 0.3;
 
 impl Model {
     /// Whether the pairs of fluids have no laws but pressure and viscosity (E4, E5 without Mueller's form).

@@ -1,9 +1,10 @@
 //! A world: constants, state and the step.
 
 use crate::assemble::Assembly;
-use crate::backend::{Backend, Cpu};
+use crate::backend::{self, Backend, Batch, Choice, Cpu, Request};
 use crate::error::Result;
 use crate::flock::Order;
+use crate::gpu::GpuError;
 use crate::integrate::Advance;
 use crate::ledger::Ledger;
 use crate::mesh::Mesh;
@@ -45,6 +46,9 @@ pub enum Trouble {
     /// A position or velocity is not finite.
     #[error("values are not finite; try a smaller solver.courant, or more solver.artificial_viscosity")]
     NotFinite,
+    /// The device does not work any more: [`World::fault`] says why.
+    #[error("the device failed")]
+    Device,
     /// The step has become so short that time stands still.
     #[error("the time step has collapsed; look for bodies that overlap, or raise solver.artificial_viscosity")]
     Stalled,
@@ -54,7 +58,7 @@ pub enum Trouble {
 const STALLED: f64 = 1e-4;
 
 /// A body moves no further in a step than this fraction of the contact diameter: contacts see it coming.
-const TRAVEL: f64 = 0.1;
+pub(crate) const TRAVEL: f64 = 0.1;
 
 /// Momentum against the impulse from outside (E12, C9): what is missing is the residual.
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,11 +78,27 @@ impl World {
         Ok(Self::new(scene.assemble()?))
     }
 
-    /// Runs an assembled scene.
+    /// Runs an assembled scene on the CPU.
     pub fn new(assembly: Assembly) -> Self {
+        Self::on(Box::new(Cpu::default()), assembly)
+    }
+
+    /// Runs an assembled scene on the backend of a choice; says why not on a GPU, where the choice was open.
+    ///
+    /// # Errors
+    /// A GPU was asked for, and there is none, or it cannot run the scene.
+    pub fn choose(choice: Choice, assembly: Assembly) -> std::result::Result<(Self, Option<String>), GpuError> {
+        let (backend, why) = backend::open(choice, &assembly.model)?;
+        let world = Self::on(backend, assembly);
+        match world.fault() {
+            None => Ok((world, why)),
+            Some(fault) => Err(fault.clone()),
+        }
+    }
+
+    fn on(mut backend: Box<dyn Backend>, assembly: Assembly) -> Self {
         let Assembly { model, state, meshes } = assembly;
-        let mut backend: Box<dyn Backend> = Box::new(Cpu::default());
-        backend.upload(state);
+        backend.upload(&model, state);
         let mut world = Self {
             model,
             backend,
@@ -100,6 +120,9 @@ impl World {
 
     /// One step, no longer than `longest` (s).
     pub fn step(&mut self, longest: f64) -> StepReport {
+        if let Some(report) = self.queue(longest, 1) {
+            return report;
+        }
         let (dt, bound) = self.next_dt(longest);
         let advance = Advance { time: self.time, dt, dt_before: self.dt_before, drag: 0.0 };
         for (stage, timer) in Stage::WCSPH.into_iter().zip(&mut self.timers) {
@@ -110,7 +133,8 @@ impl World {
         self.dt_before = dt;
         self.time += dt;
         self.steps += 1;
-        self.record(dt, bound)
+        let ledger = self.backend.ledger().clone();
+        self.record(dt, bound, &ledger)
     }
 
     /// Steps to `until` (s) exactly: the rest of the way is cut into whole, equal steps, anew after each. Calls
@@ -126,6 +150,39 @@ impl World {
                 break;
             }
         }
+    }
+
+    /// Steps to `until` (s) exactly, as [`World::advance`] does, but with nobody looking between the steps: what a GPU does
+    /// without waiting.
+    pub fn run_to(&mut self, until: f64) -> Option<Trouble> {
+        while self.time < until {
+            let left = until - self.time;
+            let report = self.queue(left, usize::MAX).unwrap_or_else(|| self.step(left));
+            if (until - self.time).abs() <= 1e-6 * report.dt {
+                self.time = until;
+            }
+            if report.trouble.is_some() {
+                return report.trouble;
+            }
+        }
+        None
+    }
+
+    /// Steps that the backend makes by itself, at most so long (s) and so many; reports the last.
+    fn queue(&mut self, longest: f64, most: usize) -> Option<StepReport> {
+        let request = Request { left: longest, dt_before: self.dt_before, drag: 0.0, most };
+        let Batch { steps, stages } = self.backend.queue(&self.model, request)?;
+        self.timers.iter_mut().zip(stages).for_each(|(timer, time)| *timer += time);
+        let mut last = None;
+        for (dt, bound, ledger) in steps {
+            self.dt_before = dt;
+            self.time += dt;
+            self.steps += 1;
+            let report = self.record(dt, bound, &ledger);
+            let worse = last.and_then(|l: StepReport| l.trouble);
+            last = Some(StepReport { trouble: worse.or(report.trouble), ..report });
+        }
+        last
     }
 
     /// Length of the next step and what bounds it (E29).
@@ -149,6 +206,9 @@ impl World {
 
     /// Where a step has to end at the latest: at the end of what was asked, or where a flock decides.
     fn next_end(&self, longest: f64) -> (f64, DtBound) {
+        if self.model.flocks.is_empty() {
+            return (longest, DtBound::Frame);
+        }
         let clocks = self.state().agents.clock.iter().zip(&self.model.flocks);
         let waits = clocks.filter(|(_, flock)| flock.tau > 0.0).map(|(clock, _)| clock.wait);
         match waits.fold(f64::INFINITY, f64::min) {
@@ -186,8 +246,7 @@ impl World {
         }
     }
 
-    fn record(&mut self, dt: f64, bound: DtBound) -> StepReport {
-        let ledger = self.backend.ledger();
+    fn record(&mut self, dt: f64, bound: DtBound, ledger: &Ledger) -> StepReport {
         match self.bound_by.iter_mut().find(|b| b.0 == bound) {
             Some((_, n)) => *n += 1,
             None => self.bound_by.push((bound, 1)),
@@ -196,7 +255,9 @@ impl World {
         self.momentum.impulse += ledger.crossed + ledger.external_impulse;
         self.momentum.force = ledger.external_force;
         let (at_rest, _) = self.model.largest_dt(0.0, 0.0);
-        let trouble = if ledger.nonfinite > 0 || !dt.is_finite() {
+        let trouble = if self.backend.fault().is_some() {
+            Some(Trouble::Device)
+        } else if ledger.nonfinite > 0 || !dt.is_finite() {
             Some(Trouble::NotFinite)
         } else if !matches!(bound, DtBound::Frame | DtBound::Flock) && dt < STALLED * at_rest {
             Some(Trouble::Stalled)
@@ -240,6 +301,16 @@ impl World {
     /// Name of the backend.
     pub fn backend(&self) -> &'static str {
         self.backend.name()
+    }
+
+    /// Name of the device, where it is not the processor.
+    pub fn device(&self) -> Option<String> {
+        self.backend.device()
+    }
+
+    /// What went wrong with the device, if anything.
+    pub fn fault(&self) -> Option<&GpuError> {
+        self.backend.fault()
     }
 
     /// Mesh of each body that was given as one, and the centre of mass in its coordinates (m).

@@ -105,7 +105,7 @@ impl Backend for Cpu {
         "cpu"
     }
 
-    fn upload(&mut self, state: State) {
+    fn upload(&mut self, _model: &Model, state: State) {
         let p = &state.particles;
         self.spare = Spare {
             record: p.record.clone(),

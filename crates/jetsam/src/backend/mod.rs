@@ -1,25 +1,106 @@
 //! Who runs the stages. A backend owns the changing state while a world runs.
 
 mod cpu;
+#[cfg(feature = "gpu")]
+mod gpu;
 
 pub use cpu::Cpu;
+#[cfg(feature = "gpu")]
+pub use gpu::OnGpu;
 
+use crate::gpu::GpuError;
 use crate::integrate::Advance;
 use crate::ledger::Ledger;
-use crate::model::Model;
+use crate::model::{DtBound, Model};
 use crate::stage::Stage;
 use crate::state::State;
+use std::time::Duration;
 
 /// A device that runs the stages of a step.
 pub trait Backend: Send {
-    /// Name for reports: `cpu`.
+    /// Name for reports: `cpu`, `gpu`.
     fn name(&self) -> &'static str;
+    /// Name of the device, where it is not the processor.
+    fn device(&self) -> Option<String> {
+        None
+    }
     /// Takes over a state.
-    fn upload(&mut self, state: State);
+    fn upload(&mut self, model: &Model, state: State);
     /// Runs one stage.
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance);
+    /// Runs whole steps without the host between them; nothing where the backend or the scene does not allow that.
+    fn queue(&mut self, _model: &Model, _request: Request) -> Option<Batch> {
+        None
+    }
     /// The present state.
     fn download(&self) -> &State;
     /// What the stage `ledger` found.
     fn ledger(&self) -> &Ledger;
+    /// What went wrong with the device, if anything. It does nothing any more then.
+    fn fault(&self) -> Option<&GpuError> {
+        None
+    }
+}
+
+/// Steps that a backend is to make by itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Request {
+    /// Time to go (s).
+    pub left: f64,
+    /// Length of the step before (s).
+    pub dt_before: f64,
+    /// Drag on fluids while a scene settles (1/s), else 0.
+    pub drag: f64,
+    /// Most steps.
+    pub most: usize,
+}
+
+/// Steps that a backend made by itself.
+#[derive(Clone, Debug, Default)]
+pub struct Batch {
+    /// Length (s), what bounded it, and what it left behind, step by step.
+    pub steps: Vec<(f64, DtBound, Ledger)>,
+    /// Time on the device by stage.
+    pub stages: [Duration; Stage::WCSPH.len()],
+}
+
+/// Which backend a world runs on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// A GPU in fact, where there is one and the scene can run on it; else the processor.
+    #[default]
+    Auto,
+    /// The processor.
+    Cpu,
+    /// A GPU, or a software driver where there is no other.
+    Gpu,
+}
+
+/// Opens the backend of a choice for a scene, and says why it is not a GPU where `Auto` had to choose.
+///
+/// # Errors
+/// `Gpu` where there is no device, or the scene cannot run on it.
+pub fn open(choice: Choice, model: &Model) -> Result<(Box<dyn Backend>, Option<String>), GpuError> {
+    let why = match choice {
+        Choice::Cpu => None,
+        Choice::Gpu => return Ok((on_gpu(model, false)?, None)),
+        Choice::Auto => match on_gpu(model, true) {
+            Ok(backend) => return Ok((backend, None)),
+            Err(why) => Some(why.to_string()),
+        },
+    };
+    Ok((Box::new(Cpu::default()), why))
+}
+
+#[cfg(feature = "gpu")]
+fn on_gpu(model: &Model, only_hardware: bool) -> Result<Box<dyn Backend>, GpuError> {
+    if let Some(what) = gpu::unsupported(model) {
+        return Err(GpuError::Scene { what });
+    }
+    Ok(Box::new(OnGpu::open(only_hardware)?))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn on_gpu(_model: &Model, _only_hardware: bool) -> Result<Box<dyn Backend>, GpuError> {
+    Err(GpuError::NotBuilt)
 }

@@ -53,9 +53,9 @@ impl Surfaces<'_> {
 }
 
 /// Overlap (as a fraction of the contact diameter) from which on a pair is looked at that could pass through (E12).
-const DEEP: f32 = 0.5;
+pub(crate) const DEEP: f32 = 0.5;
 /// It is stopped if its kinetic energy is so many times what the springs may still take.
-const HELD: f32 = 1.05;
+pub(crate) const HELD: f32 = 1.05;
 
 /// Adds the contacts with the particles in `list` to `touch`; `friction` collects what the slip is derived from.
 #[inline(always)]

@@ -354,4 +354,4 @@ impl<'a> Pairs<'a> {
 }
 
 /// Particles with at least this much of a full neighbourhood `sum V_j W_ij` are shifted.
-const SHIFTED_ABOVE: f32 = 0.93;
+pub(crate) const SHIFTED_ABOVE: f32 = 0.93;

@@ -25,7 +25,7 @@ fn of_state(model: &Model, owner: u32, d: f32) -> f32 {
 }
 
 /// How far an integrated density may be below the summed one.
-const BELOW_SUM: f32 = 0.03;
+pub(crate) const BELOW_SUM: f32 = 0.03;
 
 /// An integrated density (E1) is held above the summed one less a little. Spray that has parted and joins again remembers
 /// a density far below one and would be packed without resistance; in a flow that holds together this does nothing.

@@ -1,0 +1,248 @@
+// What all kernels share: constants, buffers, the domain, and the walk over the particles around a place.
+// The text before this one, made for each scene, holds its choices as constants (backend/gpu/program.rs).
+
+struct Fluid {
+  density: f32, mass: f32, viscosity: f32, stiffness: f32,
+  artificial: f32, cohesion: f32, curvature: f32, diffusion: f32,
+}
+
+// E30. kind: 0 point gravity, 1 wind, 2 vortex.
+struct Field { place: vec4<f32>, axis: vec4<f32>, kind: u32, strength: f32, core: f32, rate: f32 }
+
+struct Constants {
+  lower: vec4<f32>,       // where particles may be (m); w: spacing (m)
+  upper: vec4<f32>,       // w: radius of the support H (m)
+  origin: vec4<f32>,      // lower corner of the first cell (m); w: 1/H
+  per_cell: vec4<f32>,    // cells per metre; w: rest volume (m^d)
+  period: vec4<f32>,      // length of periodic axes (m), 0 for others; w: contact diameter (m)
+  gravity: vec4<f32>,     // without shaking (m/s^2); w: speed of sound (m/s)
+  corner: vec4<f32>,      // where potential energy is zero (m); w: neighbours of a full support
+  kernel: vec4<f32>,      // factors of W, of G; W at one spacing, W at no distance
+  tune: vec4<f32>,        // factor of the Laplacian; softening (m^2); XSPH; shifting
+  contact: vec4<f32>,     // square of the rate (1/s^2) that makes springs of masses; vorticity times spacing (m)
+  step: vec4<f32>,        // courant, courant_force, bound that does not change (s), stated dt (s) or 0
+  cells: vec4<u32>,       // cells on each axis; w: their number
+  count: vec4<u32>,       // capacity of fluids, slots of rigid bodies, slots of all bodies, bodies
+  more: vec4<u32>,        // parts of bodies, blocks of the scan, groups of the ledger, axes that are open (bits)
+  fluids: array<Fluid, FLUIDS>,
+  fields: array<Field, FIELDS>,
+}
+
+// As `state::Record`: place and volume, velocity and pressure share.
+struct Record { x: vec4<f32>, v: vec4<f32> }
+
+// A particle after its drift, before the sort. push: acceleration and D of fluids, (0, 0, 0, 1/mass of its body) of bodies' particles.
+struct Drifted { x: vec4<f32>, v: vec4<f32>, push: vec4<f32>, id: u32, owner: u32, rate: vec2<f32> }
+
+struct Body {
+  x: vec4<f32>,           // centre of mass (m); w: 1/mass as forces feel it, 0 if they do not move it
+  rest: vec4<f32>,        // what rounding left over of x; w: mass (kg), 0 if forces do not move it
+  q: vec4<f32>,           // orientation
+  v: vec4<f32>,
+  omega: vec4<f32>,
+  acceleration: vec4<f32>,            // of scripts, else 0
+  angular_acceleration: vec4<f32>,
+  v_half: vec4<f32>,
+  l: vec4<f32>,
+  l_half: vec4<f32>,
+  inertia_x: vec4<f32>,   // columns of the inverse inertia in the body's axes
+  inertia_y: vec4<f32>,
+  inertia_z: vec4<f32>,
+  force: vec4<f32>,       // w: contacts that share its load
+  torque: vec4<f32>,
+  force_fluid: vec4<f32>,
+  force_contact: vec4<f32>,
+  torque_fluid: vec4<f32>,
+  torque_contact: vec4<f32>,
+  law: vec4<f32>,         // ln of restitution, shared_by, face, friction
+  stated: vec4<f32>,      // stiffness (or 0), damping (or negative), mass of a particle, 1 if one-way
+  counts: vec4<u32>,      // contacts, deep, first part, parts
+}
+
+struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, slip: vec4<f32>, owner: u32, place: u32, unused: vec2<u32> }
+
+// Of what the force on a body's particle consists.
+struct Touch { fluid: vec4<f32>, contact: vec4<f32>, couple: vec4<f32>, slip: vec4<f32> }
+
+// Sums over a part of a body; w: contacts, sharers, deep.
+struct PartSum { force: vec4<f32>, fluid: vec4<f32>, contact: vec4<f32>, torque: vec4<f32>, torque_fluid: vec4<f32>, torque_contact: vec4<f32> }
+struct Part { body: u32, first: u32, end: u32, unused: u32 }
+
+// Time, and what the last step left behind for this one.
+struct Clock {
+  dt: f32, dt_before: f32, left: f32, drag: f32,
+  gravity: vec4<f32>,      // now, shaking included
+  fastest: f32,            // largest speed of any particle
+  running: u32,            // 0 once the frame is over: kernels then do nothing
+  step: u32,               // steps of this frame so far
+  live: u32,               // fluid particles before the sort
+  bound: u32, own: u32,    // own: 1 where kernels choose dt, 0 where the host has
+  unused: vec2<u32>,
+}
+
+// What a step leaves behind, as `ledger::Ledger`.
+struct Sums {
+  step: vec4<f32>,         // dt, bound (as bits), largest speed, largest acceleration
+  energy: vec4<f32>,       // kinetic, potential, sum of |force|, largest speed of a body's particle
+  momentum: vec4<f32>,     // w: sum of |p|
+  outer: vec4<f32>,     // w: sum of density errors
+  total: vec4<f32>,        // w: largest density error
+  crossed: vec4<f32>,      // w: sum of neighbours
+  count: vec4<u32>,        // fluid alive, left, lost, not finite
+  more: vec4<u32>,         // drained, rigid lost, with full support, fast contacts
+}
+
+@group(0) @binding(0) var<uniform> m: Constants;
+@group(0) @binding(1) var<storage, read_write> clock: Clock;
+@group(0) @binding(2) var<storage, read_write> records: array<Record>;      // sorted: fluid, rigid, static
+@group(0) @binding(3) var<storage, read_write> info: array<vec2<u32>>;      // sorted: id or slot, owner
+@group(0) @binding(4) var<storage, read_write> push: array<vec4<f32>>;      // sorted: acceleration or force; w: D of fluids
+@group(0) @binding(5) var<storage, read_write> before: array<vec4<f32>>;    // acceleration a step ago; w: neighbours (bits)
+@group(0) @binding(6) var<storage, read_write> drifted: array<Drifted>;
+@group(0) @binding(7) var<storage, read_write> starts: array<u32>;          // where cells begin, kind by kind
+@group(0) @binding(8) var<storage, read_write> counts: array<atomic<u32>>;
+@group(0) @binding(9) var<storage, read_write> order: array<u32>;
+@group(0) @binding(10) var<storage, read_write> blocks: array<u32>;
+@group(0) @binding(11) var<storage, read_write> bodies: array<Body>;
+@group(0) @binding(12) var<storage, read_write> slots: array<Slot>;
+@group(0) @binding(13) var<storage, read_write> touch: array<Touch>;        // sorted, from the first rigid particle on
+@group(0) @binding(14) var<storage, read_write> mirror: array<vec4<f32>>;   // as touch
+@group(0) @binding(15) var<storage, read_write> parts: array<Part>;
+@group(0) @binding(16) var<storage, read_write> part_sums: array<PartSum>;
+@group(0) @binding(17) var<storage, read_write> carry: array<vec4<f32>>;    // fluid
+@group(0) @binding(18) var<storage, read_write> rate: array<vec2<f32>>;     // fluid
+@group(0) @binding(19) var<storage, read_write> gradient: array<vec4<f32>>; // fluid
+@group(0) @binding(20) var<storage, read_write> vorticity: array<vec4<f32>>;// fluid
+@group(0) @binding(21) var<storage, read_write> sums: array<Sums>;          // groups of the ledger
+@group(0) @binding(22) var<storage, read_write> log: array<Sums>;           // 0: the last step; then one a step
+
+const GONE: u32 = 0xffffffffu;
+// Bins behind the cells of a kind: left, lost, not finite, drained or not used.
+const BINS: u32 = 4u;
+const DRAINED: f32 = 3.4028235e38;
+const FLUID: u32 = 0u;
+const RIGID: u32 = 1u;
+const STATIC: u32 = 2u;
+
+// The number of this invocation, where one dimension does not hold all workgroups.
+fn number(group: vec3<u32>, groups: vec3<u32>, local: u32, size: u32) -> u32 {
+  return (group.y * groups.x + group.x) * size + local;
+}
+
+fn live_fluid() -> u32 { return starts[m.cells.w]; }
+fn first_static() -> u32 { return m.count.x + m.count.y; }
+// The first bin of a kind.
+fn bins_of(kind: u32) -> u32 { return kind * (m.cells.w + BINS); }
+// End of the particles of rigid bodies inside the domain.
+fn rigid_end() -> u32 { return starts[bins_of(RIGID) + m.cells.w]; }
+
+fn finite(x: f32) -> bool { return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u; }
+
+// A difference of places, by the shortest way on periodic axes.
+fn shortest(d: f32, period: f32) -> f32 {
+  let half = 0.5 * period;
+  return d - select(0.0, period, d > half) + select(0.0, period, d < -half);
+}
+fn wrap(d: vec3<f32>) -> vec3<f32> {
+  if (!PERIODIC) { return d; }
+  return vec3<f32>(shortest(d.x, m.period.x), shortest(d.y, m.period.y), shortest(d.z, m.period.z));
+}
+
+// A place brought back into the domain along one periodic axis.
+fn home(x: f32, lower: f32, upper: f32, period: f32) -> f32 {
+  if (period == 0.0) { return x; }
+  var at = x;
+  if (at >= upper) { at -= period; }
+  if (at < lower) {
+    at += period;
+    if (at >= upper) { at = lower; }
+  }
+  return at;
+}
+fn home_all(x: vec3<f32>) -> vec3<f32> {
+  if (!PERIODIC) { return x; }
+  return vec3<f32>(home(x.x, m.lower.x, m.upper.x, m.period.x), home(x.y, m.lower.y, m.upper.y, m.period.y),
+                   home(x.z, m.lower.z, m.upper.z, m.period.z));
+}
+
+fn cell_of(x: vec3<f32>) -> vec3<i32> {
+  return clamp(vec3<i32>((x - m.origin.xyz) * m.per_cell.xyz), vec3<i32>(0), vec3<i32>(m.cells.xyz) - 1);
+}
+fn index_of(c: vec3<i32>) -> u32 {
+  return (u32(c.z) * m.cells.y + u32(c.y)) * m.cells.x + u32(c.x);
+}
+
+// Walks over the particles of one kind in the cells around a place, in the order in which they stand.
+struct Walk { cell: vec3<i32>, bins: u32, run: i32, at: u32, end: u32 }
+
+fn walk(x: vec3<f32>, kind: u32) -> Walk { return Walk(cell_of(x), bins_of(kind), -1, 0u, 0u); }
+
+// The cell `k` (0, 1, 2) of three along an axis, or -1 where there is none. A periodic axis of fewer cells has each once.
+fn along(c: i32, k: i32, cells: i32, periodic: bool) -> i32 {
+  var at = c + k - 1;
+  if (periodic) {
+    if (cells < 3) { return select(-1, k, k < cells); }
+    at = select(at, at + cells, at < 0);
+    return select(at, at - cells, at >= cells);
+  }
+  return select(at, -1, at >= cells);
+}
+
+// Places of the particles in run `r`: three cells side by side on x, or the one across a periodic side.
+fn run_of(w: Walk, r: i32) -> vec2<u32> {
+  let row = r / SPLIT;
+  let n = vec3<i32>(m.cells.xyz);
+  let y = select(along(w.cell.y, row % 3, n.y, m.period.y > 0.0), 0, FLAT);
+  let z = along(w.cell.z, select(row / 3, row, FLAT), n.z, m.period.z > 0.0);
+  if (y < 0 || z < 0) { return vec2<u32>(0u); }
+  var low = max(w.cell.x - 1, 0);
+  var high = min(w.cell.x + 1, n.x - 1);
+  if (r % SPLIT == 1) {
+    if (n.x < 3) { return vec2<u32>(0u); }
+    if (w.cell.x == 0) { low = n.x - 1; high = low; }
+    else if (w.cell.x == n.x - 1) { low = 0; high = 0; }
+    else { return vec2<u32>(0u); }
+  }
+  let base = w.bins + (u32(z) * m.cells.y + u32(y)) * m.cells.x;
+  return vec2<u32>(starts[base + u32(low)], starts[base + u32(high) + 1u]);
+}
+
+// Steps to the next particle, `at`; false where there is none.
+fn next(w: ptr<function, Walk>) -> bool {
+  (*w).at += 1u;
+  while ((*w).at >= (*w).end) {
+    (*w).run += 1;
+    if ((*w).run >= RUNS) { return false; }
+    let run = run_of(*w, (*w).run);
+    (*w).at = run.x;
+    (*w).end = run.y;
+  }
+  return true;
+}
+
+// E30, gravity aside (m/s^2).
+fn fields_at(x: vec3<f32>, v: vec3<f32>) -> vec3<f32> {
+  var total = vec3<f32>(0.0);
+  for (var k = 0u; k < HAS_FIELDS; k += 1u) {
+    let f = m.fields[k];
+    if (f.kind == 0u) { total += point_gravity(wrap(x - f.place.xyz), f.strength, f.core); }
+    else if (f.kind == 1u) { total += wind(v, f.place.xyz, f.rate); }
+    else { total += vortex(wrap(x - f.place.xyz), v, f.axis.xyz, f.strength, f.core, f.rate); }
+  }
+  if (FLAT) { total.y = 0.0; }
+  return total;
+}
+
+// Quaternions, the real part last.
+fn turn(q: vec4<f32>, v: vec3<f32>) -> vec3<f32> {
+  let t = 2.0 * cross(q.xyz, v);
+  return v + q.w * t + cross(q.xyz, t);
+}
+fn times(a: vec4<f32>, b: vec4<f32>) -> vec4<f32> {
+  return vec4<f32>(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
+}
+fn turned_by(angle: vec3<f32>) -> vec4<f32> {
+  let size = length(angle);
+  if (size < 1e-6) { return normalize(vec4<f32>(0.5 * angle, 1.0)); }
+  return vec4<f32>(angle * (sin(0.5 * size) / size), cos(0.5 * size));
+}

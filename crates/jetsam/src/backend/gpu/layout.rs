@@ -1,0 +1,409 @@
+//! Rust's side of the structures of `common.wgsl`: constants from a model, bodies and slots to and from a state.
+
+use super::program::fields;
+use crate::model::Model;
+use crate::scene::{Force, Wall};
+use crate::state::{Body, State};
+use bytemuck::{Pod, Zeroable};
+use glam::{DQuat, DVec3, Vec3};
+
+/// Slots of one part of a body: a workgroup sums them.
+pub const PART: usize = 128;
+/// Cells of one block of the scan.
+pub const BLOCK: u32 = 2048;
+/// Bins behind the cells of a kind.
+pub const BINS: u32 = 4;
+/// A particle of a body that is outside the domain.
+pub const GONE: u32 = u32::MAX;
+
+type V = [f32; 4];
+
+/// `Constants` without its arrays.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Constants {
+    pub lower: V,
+    pub upper: V,
+    pub origin: V,
+    pub per_cell: V,
+    pub period: V,
+    pub gravity: V,
+    pub corner: V,
+    pub kernel: V,
+    pub tune: V,
+    pub contact: V,
+    pub step: V,
+    pub cells: [u32; 4],
+    pub count: [u32; 4],
+    pub more: [u32; 4],
+}
+
+/// A particle after its drift.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Drifted {
+    pub x: V,
+    pub v: V,
+    pub push: V,
+    pub id: u32,
+    pub owner: u32,
+    pub rate: [f32; 2],
+}
+
+/// A body.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct GpuBody {
+    pub pose: Pose,
+    pub v_half: V,
+    pub l: V,
+    pub l_half: V,
+    pub inertia: [V; 3],
+    pub force: V,
+    pub torque: V,
+    pub force_fluid: V,
+    pub force_contact: V,
+    pub torque_fluid: V,
+    pub torque_contact: V,
+    pub law: V,
+    pub stated: V,
+    pub counts: [u32; 4],
+}
+
+/// What a script writes of a body: the beginning of [`GpuBody`].
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Pose {
+    pub x: V,
+    pub rest: V,
+    pub q: V,
+    pub v: V,
+    pub omega: V,
+    pub acceleration: V,
+    pub angular_acceleration: V,
+}
+
+/// A particle of a body.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Slot {
+    pub offset: V,
+    pub normal: V,
+    pub facing: V,
+    pub slip: V,
+    pub owner: u32,
+    pub place: u32,
+    pub unused: [u32; 2],
+}
+
+/// Of what the force on a body's particle consists.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Touch {
+    pub fluid: V,
+    pub contact: V,
+    pub couple: V,
+    pub slip: V,
+}
+
+/// Time.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Clock {
+    pub dt: f32,
+    pub dt_before: f32,
+    pub left: f32,
+    pub drag: f32,
+    pub gravity: V,
+    pub fastest: f32,
+    pub running: u32,
+    pub step: u32,
+    pub live: u32,
+    pub bound: u32,
+    pub own: u32,
+    pub unused: [u32; 2],
+}
+
+/// What a step leaves behind.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Sums {
+    pub step: V,
+    pub energy: V,
+    pub momentum: V,
+    pub outer: V,
+    pub total: V,
+    pub crossed: V,
+    pub count: [u32; 4],
+    pub more: [u32; 4],
+}
+
+/// Three numbers and a fourth.
+pub fn with(v: impl Into<[f32; 3]>, w: f32) -> V {
+    let [x, y, z] = v.into();
+    [x, y, z, w]
+}
+
+/// Three numbers in single precision.
+pub fn single(v: DVec3, w: f32) -> V {
+    with(v.as_vec3(), w)
+}
+
+/// The first three numbers.
+pub fn three(v: V) -> [f32; 3] {
+    [v[0], v[1], v[2]]
+}
+
+/// The first three numbers in double precision.
+pub fn double(v: V) -> DVec3 {
+    DVec3::from(three(v).map(f64::from))
+}
+
+/// Sizes that the constants also hold.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    /// Places for fluid particles.
+    pub fluids: u32,
+    /// Slots of rigid bodies.
+    pub rigid: u32,
+    /// Slots of all bodies.
+    pub slots: u32,
+    /// Bodies.
+    pub bodies: u32,
+    /// Parts of bodies.
+    pub parts: u32,
+    /// Cells of the grid.
+    pub cells: u32,
+    /// Groups of the ledger.
+    pub groups: u32,
+}
+
+impl Sizes {
+    /// Bins of fluids and rigid particles.
+    pub fn bins(self) -> u32 {
+        2 * (self.cells + BINS)
+    }
+
+    /// Blocks of the scan over the bins.
+    pub fn blocks(self) -> u32 {
+        self.bins().div_ceil(BLOCK)
+    }
+}
+
+/// The constants of a scene as bytes of the uniform buffer.
+pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
+    let (s, g, f) = (&model.solver, &model.grid, &model.factors);
+    let rate = model.largest_speed / (s.contact_overlap * model.spacing);
+    let open = (0..3).filter(|&a| g.walls[a] == Wall::Open).map(|a| 1 << a).sum();
+    let fixed = model.dt_bounds.iter().map(|b| b.1).fold(f64::from(f32::MAX), f64::min);
+    let [x, y, z] = g.cells.map(|c| c as u32);
+    let base = Constants {
+        lower: with(g.lower, model.spacing as f32),
+        upper: with(g.upper, model.support as f32),
+        origin: with(g.origin, model.inverse_support()),
+        per_cell: with(g.inverse, model.volume as f32),
+        period: with(g.period, model.contact_diameter as f32),
+        gravity: single(model.gravity, model.sound_speed as f32),
+        corner: single(g.min, model.full_support as f32),
+        kernel: [f.w, f.g, f.w_spacing, f.w_own],
+        tune: [f.laplacian, model.softening(), s.xsph as f32, s.shifting as f32],
+        contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 0.0, 0.0],
+        step: [s.courant as f32, s.courant_force as f32, fixed as f32, s.dt.unwrap_or(0.0) as f32],
+        cells: [x, y, z, sizes.cells],
+        count: [sizes.fluids, sizes.rigid, sizes.slots, sizes.bodies],
+        more: [sizes.parts, sizes.blocks(), sizes.groups, open],
+    };
+    let mut bytes = bytemuck::bytes_of(&base).to_vec();
+    for f in &model.fluids {
+        let numbers = [f.density, f.mass, f.viscosity, f.stiffness, f.artificial, f.cohesion, f.curvature, f.diffusion];
+        bytes.extend(bytemuck::bytes_of(&numbers));
+    }
+    if model.fluids.is_empty() {
+        bytes.extend([0; 32]);
+    }
+    let mut any = false;
+    for field in fields(model) {
+        any = true;
+        let (place, axis, kind, numbers) = match *field {
+            Force::Point { center, strength, core } => (center, [0.0; 3], 0u32, [strength, core, 0.0]),
+            Force::Wind { velocity, rate } => (velocity, [0.0; 3], 1, [0.0, 0.0, rate]),
+            Force::Vortex { center, axis, speed, core, rate } => {
+                (center, DVec3::from(axis).normalize_or_zero().to_array(), 2, [speed, core, rate])
+            }
+            Force::Shake(_) => continue,
+        };
+        bytes.extend(bytemuck::bytes_of(&single(place.into(), 0.0)));
+        bytes.extend(bytemuck::bytes_of(&single(axis.into(), 0.0)));
+        bytes.extend(kind.to_ne_bytes());
+        bytes.extend(bytemuck::bytes_of(&numbers.map(|n| n as f32)));
+    }
+    if !any {
+        bytes.extend([0; 48]);
+    }
+    bytes
+}
+
+/// The pose of a body.
+pub fn pose(body: &Body) -> Pose {
+    let (inverse, mass) = if body.is_static() { (0.0, 0.0) } else { (1.0 / body.mass, body.mass) };
+    let x = body.x.as_vec3();
+    Pose {
+        x: with(x, inverse as f32),
+        // the place is x - rest
+        rest: single(x.as_dvec3() - body.x, mass as f32),
+        q: body.q.as_quat().to_array(),
+        v: single(body.v, 0.0),
+        omega: single(body.omega, 0.0),
+        acceleration: single(body.acceleration, 0.0),
+        angular_acceleration: single(body.angular_acceleration, 0.0),
+    }
+}
+
+/// Bodies with the parts that `first` and `count` tell.
+pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> {
+    let body = |(k, b): (usize, &Body)| {
+        let c = &model.contacts[k];
+        let inertia = b.inverse_inertia;
+        let first = parts.iter().position(|p| p[0] == k as u32).unwrap_or(0);
+        let count = b.slots.len().div_ceil(PART);
+        let particle = if b.is_static() { 0.0 } else { b.mass / b.slots.len().max(1) as f64 };
+        GpuBody {
+            pose: pose(b),
+            v_half: single(b.v_half, 0.0),
+            l: single(b.l, 0.0),
+            l_half: single(b.l_half, 0.0),
+            inertia: [inertia.x_axis, inertia.y_axis, inertia.z_axis].map(|c| single(c, 0.0)),
+            force: single(b.force, b.sharers),
+            torque: single(b.torque, 0.0),
+            law: [c.ln_restitution, c.shared_by, c.face, c.friction],
+            stated: [c.stiffness, c.damping, particle as f32, f32::from(b.one_way)],
+            counts: [b.contacts, 0, first as u32, count as u32],
+            ..GpuBody::default()
+        }
+    };
+    state.bodies.body.iter().enumerate().map(body).collect()
+}
+
+/// Brings a body home.
+pub fn to_body(from: &GpuBody, body: &mut Body) {
+    let p = &from.pose;
+    if !body.is_static() {
+        body.x = double(p.x) - double(p.rest);
+        body.q = DQuat::from_array(p.q.map(f64::from));
+        (body.v, body.omega) = (double(p.v), double(p.omega));
+        (body.l, body.v_half, body.l_half) = (double(from.l), double(from.v_half), double(from.l_half));
+        body.sharers = from.force[3];
+    }
+    (body.force, body.torque) = (double(from.force), double(from.torque));
+    (body.force_fluid, body.force_contact) = (double(from.force_fluid), double(from.force_contact));
+    (body.torque_fluid, body.torque_contact) = (double(from.torque_fluid), double(from.torque_contact));
+    body.contacts = from.counts[0];
+    body.deep = from.counts[1] & 1 != 0;
+}
+
+/// Parts of bodies: body, first slot, end.
+pub fn parts(state: &State) -> Vec<[u32; 4]> {
+    let cut = |(body, b): (usize, &Body)| {
+        let slots = b.slots.clone();
+        slots.clone().step_by(PART).map(move |s| [body as u32, s as u32, (s + PART).min(slots.end) as u32, 0])
+    };
+    state.bodies.body.iter().enumerate().flat_map(cut).collect()
+}
+
+/// Slots; `place` of each, where it is known.
+pub fn slots(state: &State, place: impl Fn(usize) -> u32) -> Vec<Slot> {
+    let b = &state.bodies;
+    let slot = |s: usize| Slot {
+        offset: single(b.offset[s], b.record[s].volume),
+        normal: with(b.normal[s], 0.0),
+        facing: with(b.facing[s], 0.0),
+        slip: with(b.slip.get(s).copied().unwrap_or_default(), 0.0),
+        owner: b.owner[s],
+        place: place(s),
+        unused: [0; 2],
+    };
+    (0..b.offset.len()).map(slot).collect()
+}
+
+/// As in `state::Touch`.
+pub fn to_touch(from: &Touch) -> crate::state::Touch {
+    crate::state::Touch {
+        fluid: three(from.fluid),
+        contact: three(from.contact),
+        couple: three(from.couple),
+        slip: three(from.slip),
+        contacts: from.contact[3] as u32,
+        sharers: from.fluid[3],
+        deep: from.couple[3] as u32,
+    }
+}
+
+/// A vector of numbers kernels wrote.
+pub fn vec(v: V) -> Vec3 {
+    Vec3::from(three(v))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::gpu::program;
+    use std::mem::{offset_of, size_of};
+    use wgpu::naga::{Module, TypeInner};
+
+    fn layout(module: &Module, name: &str) -> (Vec<(String, u32)>, u32) {
+        let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
+        let Some((_, naga_type)) = found else { panic!("{name} is not in the text") };
+        let TypeInner::Struct { members, span } = &naga_type.inner else { panic!("{name} is no structure") };
+        (members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect(), *span)
+    }
+
+    /// Both sides put every number in the same place, as naga tells.
+    #[test]
+    fn both_sides_agree_on_offsets() {
+        let text = "[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n[resolution]\nspacing = 0.1\n";
+        let scene = crate::Scene::parse(crate::scene::Source { text: text.into(), ..Default::default() }, &[])
+            .unwrap_or_else(|e| panic!("{e}"));
+        let model = scene.assemble().unwrap_or_else(|e| panic!("{e}")).model;
+        let (module, _) = program::parsed(&program::text(&model)).unwrap_or_else(|e| panic!("{e}"));
+        macro_rules! same {
+            ($wgsl:literal, $rust:ty, $($field:ident),*) => {{
+                let (members, span) = layout(&module, $wgsl);
+                $(
+                    let there = members.iter().find(|m| m.0 == stringify!($field)).map(|m| m.1);
+                    assert_eq!(there, Some(offset_of!($rust, $field) as u32), "{}.{}", $wgsl, stringify!($field));
+                )*
+                assert_eq!(span as usize, size_of::<$rust>(), "{}", $wgsl);
+            }};
+        }
+        same!("Drifted", Drifted, x, v, push, id, owner, rate);
+        same!("Slot", Slot, offset, normal, facing, slip, owner, place);
+        same!("Touch", Touch, fluid, contact, couple, slip);
+        same!("Clock", Clock, dt, dt_before, left, drag, gravity, fastest, running, step, live, bound, own);
+        same!("Sums", Sums, step, energy, momentum, outer, total, crossed, count, more);
+        same!(
+            "Body",
+            GpuBody,
+            v_half,
+            l,
+            l_half,
+            force,
+            torque,
+            force_fluid,
+            force_contact,
+            torque_fluid,
+            torque_contact,
+            law,
+            stated,
+            counts
+        );
+        let (body, _) = layout(&module, "Body");
+        let at = |name: &str| body.iter().find(|m| m.0 == name).map(|m| m.1 as usize);
+        assert_eq!(at("angular_acceleration"), Some(offset_of!(Pose, angular_acceleration)));
+        assert_eq!(at("inertia_x"), Some(offset_of!(GpuBody, inertia)));
+        let (constants, _) = layout(&module, "Constants");
+        let at = |name: &str| constants.iter().find(|m| m.0 == name).map(|m| m.1 as usize);
+        assert_eq!(at("step"), Some(offset_of!(Constants, step)));
+        assert_eq!(at("more"), Some(offset_of!(Constants, more)));
+        assert_eq!(at("fluids"), Some(size_of::<Constants>()));
+    }
+}

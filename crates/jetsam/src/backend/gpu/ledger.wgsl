@@ -1,0 +1,156 @@
+// Stage `ledger` and the length of the next step (E29): sums in a fixed order, group by group, then over groups.
+
+const GROUP: u32 = 128u;
+var<workgroup> partial: array<Sums, 64>;
+
+fn both(a: Sums, b: Sums) -> Sums {
+  return Sums(
+    vec4<f32>(0.0, 0.0, max(a.step.z, b.step.z), max(a.step.w, b.step.w)),
+    vec4<f32>(a.energy.xyz + b.energy.xyz, max(a.energy.w, b.energy.w)),
+    a.momentum + b.momentum, a.outer + b.outer,
+    vec4<f32>(a.total.xyz + b.total.xyz, max(a.total.w, b.total.w)),
+    a.crossed + b.crossed, a.count + b.count, a.more + b.more);
+}
+
+fn of_fluid(i: u32) -> Sums {
+  var s = Sums();
+  let r = records[i];
+  let fluid = m.fluids[info[i].y];
+  let a = push[i];
+  let speed = length(r.v.xyz);
+  s.step = vec4<f32>(0.0, 0.0, speed, length(a.xyz));
+  s.momentum = fluid.mass * vec4<f32>(r.v.xyz, speed);
+  s.total = vec4<f32>(fluid.mass * a.xyz, 0.0);
+  var outside = clock.gravity.xyz + fields_at(r.x.xyz, r.v.xyz);
+  if (VORTICITY) { outside += vorticity[i].xyz; }
+  s.outer = vec4<f32>(fluid.mass * outside, 0.0);
+  s.energy = vec4<f32>(0.5 * fluid.mass * speed * speed, -fluid.mass * dot(m.gravity.xyz, r.x.xyz - m.corner.xyz), fluid.mass * s.step.w, 0.0);
+  let near = bitcast<u32>(before[i].w);
+  s.crossed.w = f32(near & 0xffffu) - 1.0;
+  if (f32(near >> 16u) >= 0.8 * m.corner.w) {
+    let error = abs(a.w - 1.0);
+    s.outer.w = error;
+    s.total.w = error;
+    s.more.z = 1u;
+  }
+  return s;
+}
+
+fn of_body(k: u32) -> Sums {
+  var s = Sums();
+  let b = bodies[k];
+  if (b.x.w == 0.0) {
+    s.outer = vec4<f32>(-b.force.xyz, 0.0);
+    return s;
+  }
+  let mass = b.rest.w;
+  let speed = length(b.v.xyz);
+  s.momentum = mass * vec4<f32>(b.v.xyz, speed);
+  s.total = vec4<f32>(b.force.xyz, 0.0);
+  var outside = mass * clock.gravity.xyz;
+  if (b.stated.w > 0.0) { outside -= b.force_fluid.xyz; }
+  s.outer = vec4<f32>(outside, 0.0);
+  s.energy = vec4<f32>(0.5 * (mass * speed * speed + dot(b.l.xyz, b.omega.xyz)), -mass * dot(m.gravity.xyz, b.x.xyz - m.corner.xyz), length(b.force.xyz), 0.0);
+  if (!(finite(b.x.x + b.x.y + b.x.z) && finite(speed) && finite(b.l.x + b.l.y + b.l.z))) { s.count.w = 1u; }
+  s.more.w = b.counts.y >> 1u;
+  return s;
+}
+
+fn of_slot(at: u32) -> Sums {
+  var s = Sums();
+  let r = records[at];
+  s.energy.w = length(r.v.xyz);
+  s.step.z = s.energy.w;
+  let b = bodies[info[at].y].x.w;
+  if (HAS_FIELDS > 0u && b > 0.0) { s.outer = vec4<f32>(bodies[info[at].y].stated.z * fields_at(r.x.xyz, r.v.xyz), 0.0); }
+  return s;
+}
+
+// Sum over the invocations of a workgroup, in the first one.
+fn in_group(l: u32, own: Sums) -> Sums {
+  var sum = own;
+  for (var reach = GROUP / 2u; reach > 0u; reach /= 2u) {
+    if (l >= reach && l < 2u * reach) { partial[l - reach] = sum; }
+    workgroupBarrier();
+    if (l < reach) { sum = both(sum, partial[l]); }
+    workgroupBarrier();
+  }
+  return sum;
+}
+
+@compute @workgroup_size(128)
+fn tally(@builtin(workgroup_id) g: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let stride = m.more.z * GROUP;
+  var sum = Sums();
+  if (clock.running != 0u) {
+    for (var i = g.x * GROUP + l; i < live_fluid(); i += stride) { sum = both(sum, of_fluid(i)); }
+    for (var k = g.x * GROUP + l; k < m.count.w; k += stride) { sum = both(sum, of_body(k)); }
+    for (var at = m.count.x + g.x * GROUP + l; at < rigid_end(); at += stride) { sum = both(sum, of_slot(at)); }
+  }
+  let all = in_group(l, sum);
+  if (l == 0u) { sums[g.x] = all; }
+}
+
+@compute @workgroup_size(128)
+fn total(@builtin(local_invocation_index) l: u32) {
+  var sum = Sums();
+  for (var k = l; k < m.more.z; k += GROUP) { sum = both(sum, sums[k]); }
+  // momentum of fluid that left in this step, in the order of bins
+  let live = live_fluid();
+  if (clock.running != 0u && l == 0u) {
+    for (var i = live; i < clock.live; i += 1u) {
+      let p = m.fluids[info[i].y].mass * records[i].v.xyz;
+      if (finite(p.x + p.y + p.z)) { sum.crossed -= vec4<f32>(p, 0.0); }
+    }
+  }
+  var all = in_group(l, sum);
+  if (l != 0u || clock.running == 0u) { return; }
+  let c = m.cells.w;
+  let r = bins_of(RIGID) + c;
+  all.step.x = clock.dt;
+  all.step.y = bitcast<f32>(clock.bound);
+  all.count = vec4<u32>(live, starts[c + 1u] - live, starts[c + 2u] - starts[c + 1u], all.count.w + starts[c + 3u] - starts[c + 2u]);
+  all.more.x = clock.live - starts[c + 3u];
+  all.more.y = starts[r + 2u] - starts[r + 1u];
+  log[0] = all;
+  log[1u + clock.step] = all;
+  clock.live = live;
+  clock.fastest = all.step.z;
+  clock.dt_before = clock.dt;
+  clock.step += 1u;
+  clock.left -= clock.dt;
+}
+
+// The length of the next step, where kernels choose it: the twin of `World::next_dt` and `Model::largest_dt`.
+@compute @workgroup_size(1)
+fn choose() {
+  if (clock.own == 0u) { return; }
+  let left = clock.left;
+  if (left <= 0.0) { clock.running = 0u; return; }
+  let last = log[0];
+  var dt = m.step.w;
+  var bound = BY_SCENE;
+  if (dt == 0.0) {
+    dt = m.step.z;
+    bound = BY_CONSTANT;
+    if (HAS_FLUIDS) {
+      let sound = m.step.x * m.upper.w / (2.0 * (m.gravity.w + last.step.z));
+      let force = m.step.y * sqrt(m.upper.w / (2.0 * max(last.step.w, 1e-30)));
+      if (sound < dt) { dt = sound; bound = BY_SOUND; }
+      if (force < dt) { dt = force; bound = BY_FORCE; }
+    }
+    let travel = TRAVEL * m.period.w / max(last.energy.w, 1e-30);
+    if (travel < dt) { dt = travel; bound = BY_TRAVEL; }
+  }
+  if (dt >= left) {
+    dt = left;
+    bound = BY_FRAME;
+  } else if (left < 1e30) {
+    // whole steps: what is left is cut evenly
+    let steps = ceil(left / dt * 0.999999);
+    dt = left;
+    if (steps > 1.0) { dt = left / steps; }
+  }
+  clock.dt = dt;
+  clock.bound = bound;
+}

@@ -1,0 +1,425 @@
+//! The GPU: every stage of the step as kernels in WGSL, the twins of the CPU's loops with the same laws.
+//!
+//! State stays on the device. Steps of a frame are queued without waiting: kernels choose their length, and what the ledger
+//! found of each comes home when the frame is over. Only when someone asks for the state is it fetched.
+
+mod layout;
+mod program;
+mod transfer;
+
+use super::{Backend, Batch, Request};
+use crate::gpu::{Gpu, GpuError};
+use crate::integrate::Advance;
+use crate::ledger::Ledger;
+use crate::model::{DtBound, Model};
+use crate::stage::Stage;
+use crate::state::State;
+use glam::DVec3;
+use layout::{Clock, GpuBody, Pose, Sizes, Sums, double};
+use program::{BOUNDS, Kernelet, Over, Program};
+use std::mem::size_of;
+use std::sync::OnceLock;
+use std::time::Duration;
+use transfer::Buffers;
+
+/// Most steps whose statistics are kept until they come home.
+const LOGGED: usize = 512;
+/// Steps in one submission: a display must not wait for long.
+const SUBMITTED: usize = 8;
+
+/// The GPU backend.
+pub struct OnGpu {
+    gpu: Gpu,
+    /// What is constant of the state, and the rest as it was when it came.
+    start: State,
+    /// The present state, once someone has asked for it.
+    present: OnceLock<State>,
+    ready: Option<Ready>,
+    ledger: Ledger,
+    clock: Clock,
+    /// A drift was made since the last sort.
+    drifted: bool,
+    fault: Option<GpuError>,
+}
+
+/// What a scene needs on the device.
+struct Ready {
+    sizes: Sizes,
+    buffers: Buffers,
+    stages: Vec<(Stage, Vec<(Kernelet, [u32; 2])>)>,
+    choose: Kernelet,
+    timers: Option<Timers>,
+}
+
+/// Timestamps round each stage of one step.
+struct Timers {
+    ticks: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    home: wgpu::Buffer,
+}
+
+/// Why a scene cannot run on a GPU yet, in words.
+pub fn unsupported(model: &Model) -> Option<&'static str> {
+    if !model.joints.is_empty() {
+        return Some("joints");
+    }
+    if !model.flocks.is_empty() {
+        return Some("flocks");
+    }
+    let mortal = model.fluids.iter().any(|f| f.lifetime.is_finite());
+    if !model.sources.is_empty() || !model.drains.is_empty() || mortal {
+        return Some("sources and sinks of fluid");
+    }
+    None
+}
+
+impl OnGpu {
+    /// Opens the most welcome device; only hardware if so asked.
+    ///
+    /// # Errors
+    /// [`GpuError`] where there is none.
+    pub fn open(only_hardware: bool) -> Result<Self, GpuError> {
+        Ok(Self {
+            gpu: Gpu::open(only_hardware)?,
+            start: State::default(),
+            present: OnceLock::new(),
+            ready: None,
+            ledger: Ledger::default(),
+            clock: Clock::default(),
+            drifted: false,
+            fault: None,
+        })
+    }
+
+    /// Its name and how it is reached.
+    pub fn device(&self) -> String {
+        format!("{} ({})", self.gpu.info.name, self.gpu.info.api)
+    }
+
+    fn prepare(&mut self, model: &Model, state: &State) -> Result<(), GpuError> {
+        let gpu = &self.gpu;
+        let ready = gpu.attempt(|| {
+            let program = Program::new(gpu, model)?;
+            let most = gpu.device.limits().max_storage_buffers_per_shader_stage;
+            if most < program.most_buffers() {
+                let reason = format!("kernels use {} buffers, it allows {most}", program.most_buffers());
+                return Err(gpu.refused(reason));
+            }
+            let (buffers, sizes) = Buffers::new(gpu, model, state, LOGGED)?;
+            let groups = |over| folded(gpu, groups(over, sizes));
+            let stage = |stage: Stage| {
+                let wanted = |name: &str| {
+                    (name != "gradients" || model.wants_gradients()) && (sizes.bodies > 0 || !name.contains("bod"))
+                };
+                let kernels = program::kernels(stage).iter().filter(|(name, _)| wanted(name));
+                let made = kernels.map(|&(name, over)| (program.kernel(gpu, name, &buffers.all), groups(over)));
+                (stage, made.filter(|(_, g)| g[0] > 0).collect())
+            };
+            Ok(Ready {
+                sizes,
+                stages: Stage::WCSPH.into_iter().map(stage).collect(),
+                choose: program.kernel(gpu, "choose", &buffers.all),
+                timers: Timers::new(gpu),
+                buffers,
+            })
+        })?;
+        self.ready = Some(ready);
+        Ok(())
+    }
+
+    /// Does some work unless something went wrong before, and notes what goes wrong.
+    fn attempt<T>(&mut self, work: impl FnOnce(&Gpu, &Ready) -> Result<T, GpuError>) -> Option<T> {
+        let ready = self.ready.as_ref().filter(|_| self.fault.is_none())?;
+        match self.gpu.attempt(|| work(&self.gpu, ready)) {
+            Ok(value) => Some(value),
+            Err(fault) => {
+                self.fault = Some(fault);
+                None
+            }
+        }
+    }
+
+    fn write_clock(&mut self, clock: Clock) {
+        self.clock = clock;
+        self.attempt(|gpu, ready| {
+            gpu.queue.write_buffer(ready.buffers.clock(), 0, bytemuck::bytes_of(&clock));
+            Ok(())
+        });
+    }
+
+    /// Takes over what steps left behind.
+    fn take(&mut self, model: &Model, sums: &[Sums]) {
+        for s in sums {
+            self.ledger = to_ledger(s, &self.ledger);
+            self.ledger.external_force = double(s.outer);
+            if model.fluids.is_empty() {
+                self.ledger.acceleration = 0.0;
+            }
+        }
+        if let Some(last) = sums.last() {
+            self.clock.live = last.count[0];
+            self.clock.fastest = last.step[2];
+        }
+    }
+}
+
+impl Backend for OnGpu {
+    fn name(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn device(&self) -> Option<String> {
+        Some(OnGpu::device(self))
+    }
+
+    fn upload(&mut self, model: &Model, state: State) {
+        self.present = OnceLock::new();
+        self.ledger = Ledger::default();
+        self.drifted = false;
+        if let Err(fault) = self.prepare(model, &state) {
+            self.fault = Some(fault);
+        }
+        let live = state.particles.count[0] as u32;
+        self.write_clock(Clock { live, gravity: layout::single(model.gravity, 0.0), ..Clock::default() });
+        self.start = state;
+    }
+
+    fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
+        self.present = OnceLock::new();
+        if stage == Stage::Drift || (stage == Stage::Cells && !self.drifted) {
+            let gravity = layout::single(model.gravity_at(advance.end()), 0.0);
+            let (dt, drag) = (advance.dt as f32, advance.drag as f32);
+            let (live, fastest) = (self.clock.live, self.clock.fastest);
+            let dt_before = advance.dt_before as f32;
+            self.write_clock(Clock { dt, dt_before, drag, gravity, live, fastest, running: 1, ..Clock::default() });
+            self.scripts(model, advance);
+        }
+        self.drifted = stage == Stage::Drift || (self.drifted && stage != Stage::Cells);
+        let undrifted = stage == Stage::Cells && !self.drifted && self.clock.dt == 0.0;
+        let sums = self.attempt(|gpu, ready| {
+            let mut commands = gpu.device.create_command_encoder(&Default::default());
+            // what is sorted is what has drifted: without a drift, all stay where they are
+            let before = ready.stages.iter().filter(|(s, _)| undrifted && *s == Stage::Drift);
+            for (_, kernels) in before.chain(ready.stages.iter().filter(|(s, _)| *s == stage)) {
+                dispatch(&mut commands, kernels, None);
+            }
+            gpu.queue.submit([commands.finish()]);
+            if stage != Stage::Ledger {
+                return Ok(Vec::new());
+            }
+            ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 0, 1)
+        });
+        if stage == Stage::Ledger {
+            self.take(model, &sums.unwrap_or_default());
+        }
+    }
+
+    fn queue(&mut self, model: &Model, request: Request) -> Option<Batch> {
+        if model.paths.iter().any(Option::is_some) || !model.shakes.is_empty() || self.fault.is_some() {
+            return None;
+        }
+        self.present = OnceLock::new();
+        let last = &self.ledger;
+        let (guess, _) = model.largest_dt(last.speed, last.acceleration);
+        let wanted = (request.left / guess * 1.02).ceil() + 1.0;
+        let steps = (if wanted.is_finite() { wanted.max(1.0) } else { 1.0 } as usize).min(request.most).min(LOGGED - 1);
+        self.write_clock(Clock {
+            left: request.left.min(f64::from(f32::MAX)) as f32,
+            dt_before: request.dt_before as f32,
+            drag: request.drag as f32,
+            running: 1,
+            own: 1,
+            ..Clock { step: 0, ..self.clock }
+        });
+        let (sums, ticks) = self.attempt(|gpu, ready| {
+            let mut made = 0;
+            while made < steps {
+                let mut commands = gpu.device.create_command_encoder(&Default::default());
+                for step in made..(made + SUBMITTED).min(steps) {
+                    let timers = ready.timers.as_ref().filter(|_| step == 0);
+                    dispatch_one(&mut commands, &ready.choose, [1, 1]);
+                    for (k, (_, kernels)) in ready.stages.iter().enumerate() {
+                        dispatch(&mut commands, kernels, timers.map(|t| (t, k as u32)));
+                    }
+                    if let Some(timers) = timers {
+                        timers.resolve(&mut commands);
+                    }
+                }
+                gpu.queue.submit([commands.finish()]);
+                made += SUBMITTED;
+            }
+            let clock: Vec<Clock> = ready.buffers.fetch(gpu, ready.buffers.clock(), 0, 1)?;
+            let done = clock[0].step as usize;
+            let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 1, done.max(1))?;
+            let ticks = match &ready.timers {
+                Some(timers) => timers.read(gpu, &ready.buffers)?,
+                None => Vec::new(),
+            };
+            Ok((sums[..done].to_vec(), ticks))
+        })?;
+        let mut batch = Batch::default();
+        for s in &sums {
+            self.take(model, std::slice::from_ref(s));
+            let bound = BOUNDS.get(s.step[1].to_bits() as usize).copied().unwrap_or(DtBound::Frame);
+            batch.steps.push((f64::from(s.step[0]), bound, self.ledger.clone()));
+        }
+        for (time, tick) in batch.stages.iter_mut().zip(ticks) {
+            *time = tick * sums.len() as u32;
+        }
+        Some(batch)
+    }
+
+    fn download(&self) -> &State {
+        self.present.get_or_init(|| {
+            let mut state = self.start.clone();
+            if let Some(ready) = self.ready.as_ref().filter(|_| self.fault.is_none()) {
+                // a fault shows at the next step
+                let _ = self.gpu.attempt(|| ready.buffers.download(&self.gpu, ready.sizes, &mut state));
+            }
+            state
+        })
+    }
+
+    fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    fn fault(&self) -> Option<&GpuError> {
+        self.fault.as_ref()
+    }
+}
+
+impl OnGpu {
+    /// Bodies that follow scripts take the poses of the end of a step (E15).
+    fn scripts(&mut self, model: &Model, advance: Advance) {
+        if advance.drag > 0.0 || advance.dt == 0.0 || model.paths.iter().all(Option::is_none) {
+            return;
+        }
+        let mut moved: Vec<(usize, Pose)> = Vec::new();
+        let bodies = self.start.bodies.body.iter_mut().zip(&model.paths).enumerate();
+        for (k, (body, path)) in bodies.filter_map(|(k, (b, p))| p.as_ref().map(|p| (k, (b, p)))) {
+            crate::integrate::bodies::script(body, path, advance.end());
+            moved.push((k, layout::pose(body)));
+        }
+        self.attempt(|gpu, ready| {
+            for (k, pose) in &moved {
+                let at = (k * size_of::<GpuBody>()) as u64;
+                gpu.queue.write_buffer(ready.buffers.bodies(), at, bytemuck::bytes_of(pose));
+            }
+            Ok(())
+        });
+    }
+}
+
+/// Workgroups of a kernel.
+fn groups(over: Over, s: Sizes) -> u32 {
+    match over {
+        Over::Fluids(size) => s.fluids.div_ceil(size),
+        Over::BodyParticles(size) => s.slots.div_ceil(size),
+        Over::Slots(size) => s.rigid.div_ceil(size),
+        Over::Moving(size) => (s.fluids + s.rigid).div_ceil(size),
+        Over::Cells(size) => s.bins().div_ceil(size),
+        Over::Blocks => s.blocks(),
+        Over::Bodies(size) => s.bodies.div_ceil(size),
+        Over::Parts => s.parts,
+        Over::Groups => s.groups,
+        Over::One => 1,
+    }
+}
+
+/// Workgroups in two dimensions, where one does not hold them all.
+fn folded(gpu: &Gpu, groups: u32) -> [u32; 2] {
+    let most = gpu.device.limits().max_compute_workgroups_per_dimension;
+    let x = groups.min(most);
+    [x, groups.div_ceil(x.max(1))]
+}
+
+fn dispatch(commands: &mut wgpu::CommandEncoder, kernels: &[(Kernelet, [u32; 2])], timers: Option<(&Timers, u32)>) {
+    let timestamp_writes = timers.map(|(timers, k)| wgpu::ComputePassTimestampWrites {
+        query_set: &timers.ticks,
+        beginning_of_pass_write_index: Some(2 * k),
+        end_of_pass_write_index: Some(2 * k + 1),
+    });
+    if kernels.is_empty() && timestamp_writes.is_none() {
+        return;
+    }
+    let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
+    for (kernel, [x, y]) in kernels {
+        pass.set_pipeline(&kernel.pipeline);
+        pass.set_bind_group(0, &kernel.bound, &[]);
+        pass.dispatch_workgroups(*x, *y, 1);
+    }
+}
+
+fn dispatch_one(commands: &mut wgpu::CommandEncoder, kernel: &Kernelet, [x, y]: [u32; 2]) {
+    let mut pass = commands.begin_compute_pass(&Default::default());
+    pass.set_pipeline(&kernel.pipeline);
+    pass.set_bind_group(0, &kernel.bound, &[]);
+    pass.dispatch_workgroups(x, y, 1);
+}
+
+/// A ledger from the sums of a step and the ledger before.
+fn to_ledger(s: &Sums, before: &Ledger) -> Ledger {
+    let [fluid, left, lost, nonfinite] = s.count;
+    let [drained, rigid_lost, full, fast] = s.more;
+    let number = f64::from;
+    Ledger {
+        speed: number(s.step[2]),
+        acceleration: number(s.step[3]),
+        body_speed: number(s.energy[3]),
+        momentum: double(s.momentum),
+        momentum_scale: number(s.momentum[3]),
+        crossed: double(s.crossed),
+        external_force: double(s.outer),
+        external_impulse: DVec3::ZERO,
+        total_force: double(s.total),
+        force_scale: number(s.energy[2]),
+        kinetic: number(s.energy[0]),
+        potential: number(s.energy[1]),
+        density_error_mean: number(s.outer[3]) / f64::from(full.max(1)),
+        density_error_max: number(s.total[3]),
+        neighbours: number(s.crossed[3]) / f64::from(fluid.max(1)),
+        fluid: fluid as usize,
+        left: before.left + u64::from(left),
+        born: before.born,
+        drained: before.drained + u64::from(drained),
+        lost: before.lost + u64::from(lost),
+        rigid_lost: rigid_lost as usize,
+        fast_contacts: before.fast_contacts + u64::from(fast),
+        nonfinite: before.nonfinite + u64::from(nonfinite),
+    }
+}
+
+impl Timers {
+    fn new(gpu: &Gpu) -> Option<Self> {
+        let count = 2 * Stage::WCSPH.len() as u32;
+        let bytes = 8 * u64::from(count);
+        let buffer = |label, usage| {
+            let descriptor =
+                wgpu::BufferDescriptor { label: Some(label), size: bytes, usage, mapped_at_creation: false };
+            gpu.device.create_buffer(&descriptor)
+        };
+        gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY).then(|| Self {
+            ticks: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("stages"),
+                ty: wgpu::QueryType::Timestamp,
+                count,
+            }),
+            resolved: buffer("ticks", wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
+            home: buffer("ticks at home", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+        })
+    }
+
+    fn resolve(&self, commands: &mut wgpu::CommandEncoder) {
+        commands.resolve_query_set(&self.ticks, 0..2 * Stage::WCSPH.len() as u32, &self.resolved, 0);
+        commands.copy_buffer_to_buffer(&self.resolved, 0, &self.home, 0, self.resolved.size());
+    }
+
+    /// Time of each stage in the step that was measured.
+    fn read(&self, gpu: &Gpu, buffers: &Buffers) -> Result<Vec<Duration>, GpuError> {
+        let ticks: Vec<u64> = buffers.mapped(gpu, &self.home)?;
+        let period = f64::from(gpu.queue.get_timestamp_period());
+        let span = |t: &[u64]| Duration::from_nanos((t[1].saturating_sub(t[0]) as f64 * period) as u64);
+        Ok(ticks.chunks_exact(2).map(span).collect())
+    }
+}

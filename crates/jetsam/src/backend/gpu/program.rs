@@ -1,0 +1,330 @@
+//! The kernels of a scene: its choices as constants, the laws, the twins of the stages, in one WGSL text.
+//!
+//! In: a [`Model`]. Out: the text, and pipelines whose bindings are read off it: a kernel is bound to the buffers it uses and to
+//! no other, as devices allow few.
+
+use super::GpuError;
+use crate::gpu::Gpu;
+use crate::interact::contacts::{DEEP, HELD};
+use crate::interact::pairs::SHIFTED_ABOVE;
+use crate::interact::pressure::BELOW_SUM;
+use crate::laws::kernel::Kernel;
+use crate::model::{CONTACT_REACH, DtBound, Model, TANGENTIAL, TANGENTIAL_DAMPING};
+use crate::scene::{Coupling, Damping, Density, EquationOfState, Force, Integrator, PressureForce, Surface, Viscosity};
+use crate::stage::Stage;
+use crate::world::TRAVEL;
+use std::fmt::Write as _;
+use wgpu::naga;
+
+/// What bounds a step, by the number kernels know it by.
+pub const BOUNDS: [DtBound; 8] = [
+    DtBound::Sound,
+    DtBound::Force,
+    DtBound::Viscosity,
+    DtBound::Contact,
+    DtBound::Travel,
+    DtBound::Flock,
+    DtBound::Scene,
+    DtBound::Frame,
+];
+
+/// The texts, in the order of the step.
+const TEXTS: [&str; 12] = [
+    include_str!("../../laws/kernel.wgsl"),
+    include_str!("../../laws/fluid.wgsl"),
+    include_str!("../../laws/contact.wgsl"),
+    include_str!("../../laws/field.wgsl"),
+    include_str!("common.wgsl"),
+    include_str!("../../integrate/particles.wgsl"),
+    include_str!("../../integrate/bodies.wgsl"),
+    include_str!("../../interact/cells.wgsl"),
+    include_str!("../../interact/density.wgsl"),
+    include_str!("../../interact/boundary.wgsl"),
+    include_str!("../../interact/gradients.wgsl"),
+    concat!(
+        include_str!("../../interact/contacts.wgsl"),
+        include_str!("../../interact/forces.wgsl"),
+        include_str!("ledger.wgsl")
+    ),
+];
+
+/// Over what a kernel runs, and how many invocations make a workgroup.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Over {
+    /// Places of fluid particles.
+    Fluids(u32),
+    /// Particles of all bodies.
+    BodyParticles(u32),
+    /// Slots of rigid bodies.
+    Slots(u32),
+    /// Places of fluids and slots of rigid bodies.
+    Moving(u32),
+    /// Cells of fluids and of rigid bodies.
+    Cells(u32),
+    /// Blocks of cells.
+    Blocks,
+    /// Bodies.
+    Bodies(u32),
+    /// Parts of bodies, one workgroup each.
+    Parts,
+    /// Groups of the ledger.
+    Groups,
+    /// One workgroup.
+    One,
+}
+
+/// The kernels of a stage, in their order. `choose` stands before the first stage.
+pub fn kernels(stage: Stage) -> &'static [(&'static str, Over)] {
+    use Over::*;
+    match stage {
+        Stage::Drift => &[("drift_fluid", Fluids(128)), ("drift_bodies", Bodies(64)), ("follow", Slots(128))],
+        Stage::Cells => &[
+            ("clear", Cells(256)),
+            ("histogram", Moving(256)),
+            ("scan_blocks", Blocks),
+            ("scan_tops", One),
+            ("scan_add", Cells(256)),
+            ("scatter", Moving(256)),
+            ("gather", Moving(256)),
+        ],
+        Stage::Density => &[("density", Fluids(128))],
+        Stage::Pressure => &[("pressure", Fluids(128))],
+        Stage::Boundary => &[("boundary", BodyParticles(128))],
+        Stage::Gradients => &[("gradients", Fluids(128))],
+        Stage::Forces => &[("forces_fluid", Fluids(128)), ("forces_body", BodyParticles(128))],
+        Stage::Bodies => &[("sum_parts", Parts), ("sum_bodies", Bodies(64))],
+        Stage::Kick => &[("kick_fluid", Fluids(128)), ("kick_bodies", Bodies(64))],
+        Stage::Ledger => &[("tally", Groups), ("total", One)],
+        Stage::Sources | Stage::Agents => &[],
+    }
+}
+
+/// The whole text for a scene.
+pub fn text(model: &Model) -> String {
+    let s = &model.solver;
+    let periodic = model.grid.period.map(|p| p > 0.0);
+    let flat = model.dimensions == 2;
+    let split = if periodic[0] { 2 } else { 1 };
+    let tension = model.fluids.iter().any(|f| f.cohesion > 0.0 || f.curvature > 0.0);
+    let continuity = s.density == Density::Continuity;
+    let bound_code = |bound| BOUNDS.iter().position(|&b| b == bound).unwrap_or(0);
+    let constant = model.dt_bounds.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(DtBound::Frame, |b| b.0);
+    let mut text = String::new();
+    let switches = [
+        ("FLAT", flat),
+        ("PERIODIC", periodic.contains(&true)),
+        ("HAS_FLUIDS", !model.fluids.is_empty()),
+        ("CONTINUITY", continuity),
+        ("COUPLED_BY_PRESSURE", s.coupling == Coupling::Pressure),
+        ("TAIT", s.equation_of_state == EquationOfState::Tait),
+        ("NEGATIVE", s.negative_pressure),
+        ("SYMMETRIC", s.pressure_force == PressureForce::Symmetric),
+        ("NO_SLIP", model.no_slip),
+        ("MUELLER", s.viscosity == Viscosity::Mueller),
+        ("XSPH", s.xsph > 0.0),
+        ("SHIFTING", s.shifting > 0.0),
+        ("TENSION", tension),
+        ("VORTICITY", s.vorticity > 0.0),
+        ("CARRIED", s.xsph > 0.0 || s.shifting > 0.0 || continuity),
+        ("WALLS_SLIP", s.walls_slip),
+        ("LEAPFROG", s.integrator == Integrator::Leapfrog),
+        ("SMOOTH", s.surface == Surface::Smooth),
+        ("FULL_DAMPING", s.damping == Damping::Full),
+    ];
+    let numbers = [
+        ("NORMAL_ONLY", if s.damping == Damping::Normal { 1.0 } else { 0.0 }),
+        ("REACH", CONTACT_REACH as f32),
+        ("BELOW_SUM", BELOW_SUM),
+        ("SHIFTED_ABOVE", SHIFTED_ABOVE),
+        ("TANGENTIAL", TANGENTIAL),
+        ("TANGENTIAL_DAMPING", TANGENTIAL_DAMPING),
+        ("DEEP", DEEP),
+        ("HELD", HELD),
+        ("TRAVEL", TRAVEL as f32),
+    ];
+    let counts = [
+        ("FLUIDS", model.fluids.len().max(1)),
+        ("FIELDS", fields(model).count().max(1)),
+        ("HAS_FIELDS", fields(model).count()),
+        ("BY_SOUND", bound_code(DtBound::Sound)),
+        ("BY_FORCE", bound_code(DtBound::Force)),
+        ("BY_TRAVEL", bound_code(DtBound::Travel)),
+        ("BY_SCENE", bound_code(DtBound::Scene)),
+        ("BY_FRAME", bound_code(DtBound::Frame)),
+        ("BY_CONSTANT", bound_code(constant)),
+    ];
+    // writing to a string does not fail
+    for (name, on) in switches {
+        let _ = writeln!(text, "const {name}: bool = {on};");
+    }
+    for (name, value) in numbers {
+        let _ = writeln!(text, "const {name}: f32 = {value:e}f;");
+    }
+    for (name, count) in counts {
+        let _ = writeln!(text, "const {name}: u32 = {count}u;");
+    }
+    let rows = if flat { 3 } else { 9 };
+    let _ = writeln!(text, "const SPLIT: i32 = {split};\nconst RUNS: i32 = {};", rows * split);
+    let (w, g) = (shape(model.kernel.density()), shape(model.kernel.force()));
+    let _ = writeln!(text, "fn density_w(s: f32) -> f32 {{ return {w}_w(s); }}");
+    let _ = writeln!(text, "fn force_g(s: f32) -> f32 {{ return {g}_g(s); }}");
+    for part in TEXTS {
+        text.push_str(part);
+    }
+    text
+}
+
+/// Fields that are not part of gravity.
+pub fn fields(model: &Model) -> impl Iterator<Item = &Force> {
+    model.fields.iter().filter(|f| !matches!(f, Force::Shake(_)))
+}
+
+/// Name of a kernel's functions in `laws/kernel.wgsl`.
+fn shape(kernel: Kernel) -> &'static str {
+    match kernel {
+        Kernel::Cubic => "cubic",
+        Kernel::WendlandC2 => "wendland_quintic",
+        Kernel::WendlandC4 => "wendland_sextic",
+        Kernel::Quintic => "quintic",
+        Kernel::Poly6 => "poly_six",
+        Kernel::Spiky | Kernel::Viscosity => "spiky",
+    }
+}
+
+/// The text understood, or what is wrong with it.
+pub fn parsed(text: &str) -> Result<(naga::Module, naga::valid::ModuleInfo), String> {
+    let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
+    let mut validator =
+        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+    let info = validator.validate(&module).map_err(|e| e.emit_to_string(text))?;
+    Ok((module, info))
+}
+
+/// One kernel, ready to run.
+pub struct Kernelet {
+    pub pipeline: wgpu::ComputePipeline,
+    pub bound: wgpu::BindGroup,
+}
+
+/// All kernels of a scene.
+pub struct Program {
+    module: naga::Module,
+    info: naga::valid::ModuleInfo,
+    shader: wgpu::ShaderModule,
+}
+
+impl Program {
+    /// Compiles the text of a scene.
+    pub fn new(gpu: &Gpu, model: &Model) -> Result<Self, GpuError> {
+        let text = text(model);
+        let (module, info) = parsed(&text).map_err(|e| gpu.refused(e))?;
+        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("jetsam"),
+            source: wgpu::ShaderSource::Wgsl(text.into()),
+        });
+        Ok(Self { module, info, shader })
+    }
+
+    /// Bindings that a kernel uses, in ascending order; the first is the uniform one where it is used.
+    fn bindings(&self, name: &str) -> Vec<u32> {
+        let Some(at) = self.module.entry_points.iter().position(|e| e.name == name) else { return Vec::new() };
+        let uses = self.info.get_entry_point(at);
+        let used = |(handle, variable): (naga::Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {
+            variable.binding.filter(|_| !uses[handle].is_empty()).map(|b| b.binding)
+        };
+        let mut bindings: Vec<u32> = self.module.global_variables.iter().filter_map(used).collect();
+        bindings.sort_unstable();
+        bindings
+    }
+
+    /// Makes a kernel, bound to `buffers` by the number of their binding.
+    pub fn kernel(&self, gpu: &Gpu, name: &str, buffers: &[wgpu::Buffer]) -> Kernelet {
+        let device = &gpu.device;
+        let bindings = self.bindings(name);
+        let entry = |&binding: &u32| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: match binding {
+                    0 => wgpu::BufferBindingType::Uniform,
+                    _ => wgpu::BufferBindingType::Storage { read_only: false },
+                },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(name),
+            entries: &bindings.iter().map(entry).collect::<Vec<_>>(),
+        });
+        let whole = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(name),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(name),
+            layout: Some(&whole),
+            module: &self.shader,
+            entry_point: Some(name),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        let entry =
+            |&binding: &u32| wgpu::BindGroupEntry { binding, resource: buffers[binding as usize].as_entire_binding() };
+        let bound = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(name),
+            layout: &layout,
+            entries: &bindings.iter().map(entry).collect::<Vec<_>>(),
+        });
+        Kernelet { pipeline, bound }
+    }
+
+    /// Most storage buffers that one kernel uses.
+    pub fn most_buffers(&self) -> u32 {
+        let used = |e: &naga::EntryPoint| self.bindings(&e.name).iter().filter(|b| **b > 0).count();
+        self.module.entry_points.iter().map(used).max().unwrap_or(0) as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scene;
+    use crate::scene::Source;
+
+    /// The text is valid for every choice of a scene, with no capability beyond the least a device has, and no kernel uses more
+    /// buffers than ten.
+    #[test]
+    fn text_is_valid_for_every_choice() {
+        let choices = [
+            "",
+            "[world]\ndimensions = 2",
+            "[solver]\ndensity = \"continuity\"\nshifting = 1.0",
+            "[solver]\nviscosity = \"mueller\"\nkernel = \"mueller\"\npressure_force = \"mueller\"",
+            "[solver]\nvorticity = 0.1\nxsph = 0.1\ncoupling = \"spring\"\ndamping = \"full\"",
+        ];
+        for choice in choices {
+            let scene = format!(
+                "{choice}\n[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\nwalls = [\"periodic\", \"solid\", \"open\"]\n[resolution]\nspacing = 0.1\n\
+                 [[fluid]]\nname = \"water\"\nsurface_tension = 0.07\nshape = {{ box = {{ min = [0, 0, 0], max = [0.5, 0.5, 0.5] }} }}\n\
+                 [[force]]\nwind = {{ velocity = [1, 0, 0], rate = 1.0 }}\n"
+            );
+            let model = Scene::parse(Source { text: scene, ..Source::default() }, &[])
+                .and_then(|s| s.assemble())
+                .unwrap_or_else(|e| panic!("{e}"))
+                .model;
+            let text = text(&model);
+            let (module, info) = parsed(&text).unwrap_or_else(|e| panic!("{choice}: {e}"));
+            for (k, entry) in module.entry_points.iter().enumerate() {
+                let uses = info.get_entry_point(k);
+                let storage = module.global_variables.iter().filter(|(handle, variable)| {
+                    matches!(variable.space, naga::AddressSpace::Storage { .. }) && !uses[*handle].is_empty()
+                });
+                let count = storage.count();
+                assert!(count <= 10, "{} uses {count} buffers", entry.name);
+            }
+        }
+    }
+}

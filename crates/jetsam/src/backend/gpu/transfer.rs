@@ -1,0 +1,288 @@
+//! Buffers of a world on the device, and the ways of a state there and back.
+
+use super::layout::{self, BINS, Drifted, GONE, GpuBody, Sizes, Slot, Sums, Touch, three, vec, with};
+use crate::gpu::{Gpu, GpuError};
+use crate::interact::cells::Grid;
+use crate::model::Model;
+use crate::scene::Density;
+use crate::state::{Kind, Record, State};
+use bytemuck::Pod;
+use std::mem::size_of;
+use std::time::Duration;
+
+/// How long a callback may keep us waiting after the device is done.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Groups of the ledger at most.
+const GROUPS: u32 = 256;
+
+/// All buffers, by the number of their binding in `common.wgsl`.
+pub struct Buffers {
+    pub all: Vec<wgpu::Buffer>,
+}
+
+/// Static particles sorted by cell: slots in their order, and where cells begin.
+struct Walls {
+    slots: Vec<usize>,
+    starts: Vec<u32>,
+    place: Vec<u32>,
+}
+
+impl Walls {
+    fn sort(grid: &Grid, state: &State, first: u32, cells: u32) -> Self {
+        let b = &state.bodies;
+        let n = b.record.len() - b.rigid_slots;
+        let key = |slot: usize| {
+            let x = b.record[slot].x;
+            let inside = (0..3).all(|a| x[a] >= grid.lower[a] && x[a] <= grid.upper[a]);
+            if !inside {
+                return cells;
+            }
+            let [x, y, z] = grid.coordinates(x).map(|c| c as u32);
+            (z * grid.cells[1] as u32 + y) * grid.cells[0] as u32 + x
+        };
+        let mut keyed: Vec<(u32, usize)> = (0..n).map(|k| (key(b.rigid_slots + k), b.rigid_slots + k)).collect();
+        keyed.sort_unstable();
+        let mut starts = vec![0; (cells + BINS) as usize];
+        for (key, _) in &keyed {
+            starts[*key as usize] += 1;
+        }
+        let mut at = first;
+        for start in &mut starts {
+            at += std::mem::replace(start, at);
+        }
+        let mut place = vec![GONE; n];
+        for (k, (key, slot)) in keyed.iter().enumerate() {
+            if *key < cells {
+                place[slot - b.rigid_slots] = first + k as u32;
+            }
+        }
+        Self { slots: keyed.into_iter().map(|(_, slot)| slot).collect(), starts, place }
+    }
+}
+
+impl Buffers {
+    /// Makes the buffers of a world and fills them.
+    pub fn new(gpu: &Gpu, model: &Model, state: &State, logged: usize) -> Result<(Self, Sizes), GpuError> {
+        let p = &state.particles;
+        let parts = layout::parts(state);
+        let cells: u64 = model.grid.cells.iter().map(|&c| c as u64).product();
+        gpu.info.holds("cells of the domain", 12 * cells)?;
+        let fluids = p.first[Kind::Rigid as usize] as u32;
+        let rigid = state.bodies.rigid_slots as u32;
+        let slots = state.bodies.record.len() as u32;
+        let sizes = Sizes {
+            fluids,
+            rigid,
+            slots,
+            bodies: state.bodies.body.len() as u32,
+            parts: parts.len() as u32,
+            cells: cells as u32,
+            groups: (fluids + rigid).div_ceil(512).clamp(1, GROUPS),
+        };
+        let walls = Walls::sort(&model.grid, state, fluids + rigid, sizes.cells);
+        let all = (fluids + slots) as usize;
+        let fluid_or = |wanted: bool| if wanted { fluids as usize } else { 0 };
+        let continuity = model.solver.density == Density::Continuity;
+        let carried = model.solver.xsph > 0.0 || model.solver.shifting > 0.0 || continuity;
+        let mirrored = if model.no_slip { slots as usize } else { 0 };
+        let make = |what: &'static str, bytes: usize| storage(gpu, what, bytes);
+        let buffers = vec![
+            uniform(gpu, &layout::constants(model, sizes))?,
+            make("time", size_of::<layout::Clock>())?,
+            make("particles", all * size_of::<Record>())?,
+            make("identities", all * 8)?,
+            make("forces", all * 16)?,
+            make("forces of the step before", fluids as usize * 16)?,
+            make("drifted particles", (fluids + rigid) as usize * size_of::<Drifted>())?,
+            make("cells", (sizes.bins() as usize + walls.starts.len()) * 4)?,
+            make("counts of cells", sizes.bins() as usize * 4)?,
+            make("order of particles", (fluids + rigid) as usize * 4)?,
+            make("blocks of cells", sizes.blocks() as usize * 4)?,
+            make("bodies", sizes.bodies as usize * size_of::<GpuBody>())?,
+            make("slots of bodies", slots as usize * size_of::<Slot>())?,
+            make("contacts of bodies", slots as usize * size_of::<Touch>())?,
+            make("mirrored velocities", mirrored * 16)?,
+            make("parts of bodies", parts.len() * 16)?,
+            make("sums of parts", parts.len() * 96)?,
+            make("carried velocities", fluid_or(carried) * 16)?,
+            make("rates of density", fluid_or(continuity) * 8)?,
+            make("gradients", fluid_or(model.wants_gradients()) * 16)?,
+            make("vorticities", fluid_or(model.wants_gradients()) * 16)?,
+            make("sums of groups", sizes.groups as usize * size_of::<Sums>())?,
+            make("statistics", (logged + 1) * size_of::<Sums>())?,
+        ];
+        let buffers = Self { all: buffers };
+        buffers.fill(gpu, model, state, &walls, &parts, sizes);
+        Ok((buffers, sizes))
+    }
+
+    fn fill(&self, gpu: &Gpu, model: &Model, state: &State, walls: &Walls, parts: &[[u32; 4]], sizes: Sizes) {
+        let (p, b) = (&state.particles, &state.bodies);
+        let n = p.count[Kind::Fluid as usize];
+        let write = |binding: usize, at: usize, bytes: &[u8]| {
+            if !bytes.is_empty() {
+                gpu.queue.write_buffer(&self.all[binding], at as u64, bytes);
+            }
+        };
+        let base = (sizes.fluids + sizes.rigid) as usize;
+        let standing: Vec<Record> = walls.slots.iter().map(|&s| b.record[s]).collect();
+        write(2, 0, bytemuck::cast_slice(&p.record[..n]));
+        write(2, base * size_of::<Record>(), bytemuck::cast_slice(&standing));
+        let pair = |k: usize| [p.id[k], p.owner[k]];
+        write(3, 0, bytemuck::cast_slice(&(0..n).map(pair).collect::<Vec<_>>()));
+        let pair = |&s: &usize| [s as u32, b.owner[s]];
+        write(3, base * 8, bytemuck::cast_slice(&walls.slots.iter().map(pair).collect::<Vec<_>>()));
+        let push: Vec<_> = (0..n).map(|k| with(p.push[k], p.density[k])).collect();
+        write(4, 0, bytemuck::cast_slice(&push));
+        write(7, sizes.bins() as usize * 4, bytemuck::cast_slice(&walls.starts));
+        write(11, 0, bytemuck::cast_slice(&layout::bodies(model, state, parts)));
+        let place = |s: usize| s.checked_sub(b.rigid_slots).map_or(GONE, |k| walls.place[k]);
+        write(12, 0, bytemuck::cast_slice(&layout::slots(state, place)));
+        write(15, 0, bytemuck::cast_slice(parts));
+        if !p.carry.is_empty() {
+            write(17, 0, bytemuck::cast_slice(&p.carry[..n]));
+        }
+        if !p.rate.is_empty() {
+            write(18, 0, bytemuck::cast_slice(&p.rate[..n]));
+        }
+    }
+
+    /// Brings the state home.
+    pub fn download(&self, gpu: &Gpu, sizes: Sizes, state: &mut State) -> Result<(), GpuError> {
+        let (cap, cells) = (sizes.fluids as usize, sizes.cells as usize);
+        let starts: Vec<u32> = self.fetch(gpu, &self.all[7], 0, sizes.bins() as usize)?;
+        let clock: Vec<layout::Clock> = self.fetch(gpu, self.clock(), 0, 1)?;
+        let live = if clock[0].step > 0 || starts[cells] > 0 { starts[cells] as usize } else { clock[0].live as usize };
+        let rigid = (starts[2 * cells + BINS as usize] as usize).saturating_sub(cap);
+        let all = cap + sizes.slots as usize;
+        let records: Vec<Record> = self.fetch(gpu, &self.all[2], 0, all)?;
+        let info: Vec<[u32; 2]> = self.fetch(gpu, &self.all[3], 0, all)?;
+        let push: Vec<[f32; 4]> = self.fetch(gpu, &self.all[4], 0, all)?;
+        let before: Vec<[f32; 4]> = self.fetch(gpu, &self.all[5], 0, cap)?;
+        let touch: Vec<Touch> = self.fetch(gpu, &self.all[13], 0, sizes.slots as usize)?;
+        let slots: Vec<Slot> = self.fetch(gpu, &self.all[12], 0, sizes.slots as usize)?;
+        let bodies: Vec<GpuBody> = self.fetch(gpu, &self.all[11], 0, sizes.bodies as usize)?;
+        let p = &mut state.particles;
+        p.count = [live, rigid, (sizes.slots - sizes.rigid) as usize];
+        let segments = Kind::ALL.into_iter().flat_map(|kind| p.segment(kind));
+        for k in segments.collect::<Vec<_>>() {
+            p.record[k] = records[k];
+            [p.id[k], p.owner[k]] = info[k];
+            p.push[k] = three(push[k]);
+        }
+        for k in 0..live {
+            p.density[k] = push[k][3];
+            p.push_before[k] = three(before[k]);
+        }
+        for (to, from) in p.touch.iter_mut().zip(&touch) {
+            *to = layout::to_touch(from);
+        }
+        if !p.carry.is_empty() {
+            p.carry[..live].copy_from_slice(&self.fetch(gpu, &self.all[17], 0, live)?);
+        }
+        if !p.rate.is_empty() {
+            p.rate[..live].copy_from_slice(&self.fetch(gpu, &self.all[18], 0, live)?);
+        }
+        if !p.gradient.is_empty() {
+            p.gradient[..live].copy_from_slice(&self.fetch(gpu, &self.all[19], 0, live)?);
+            let curls: Vec<[f32; 4]> = self.fetch(gpu, &self.all[20], 0, live)?;
+            p.vorticity.iter_mut().zip(curls).for_each(|(to, from)| *to = three(from));
+        }
+        let b = &mut state.bodies;
+        for (body, from) in b.body.iter_mut().zip(&bodies) {
+            layout::to_body(from, body);
+        }
+        for (s, slot) in slots.iter().enumerate().take(b.rigid_slots) {
+            b.facing[s] = three(slot.facing);
+            if let Some(slip) = b.slip.get_mut(s) {
+                *slip = vec(slot.slip).to_array();
+            }
+            if slot.place != GONE {
+                b.record[s] = records[slot.place as usize];
+            }
+        }
+        Ok(())
+    }
+
+    /// The clock.
+    pub fn clock(&self) -> &wgpu::Buffer {
+        &self.all[1]
+    }
+
+    /// Bodies.
+    pub fn bodies(&self) -> &wgpu::Buffer {
+        &self.all[11]
+    }
+
+    /// Statistics of steps: the last, then one a step.
+    pub fn log(&self) -> &wgpu::Buffer {
+        &self.all[22]
+    }
+
+    /// Waits for the device and reads `count` items of a buffer, from number `first` on.
+    pub fn fetch<T: Pod>(
+        &self,
+        gpu: &Gpu,
+        from: &wgpu::Buffer,
+        first: usize,
+        count: usize,
+    ) -> Result<Vec<T>, GpuError> {
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let bytes = (count * size_of::<T>()) as u64;
+        let home = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("at home"),
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        commands.copy_buffer_to_buffer(from, (first * size_of::<T>()) as u64, &home, 0, bytes);
+        gpu.queue.submit([commands.finish()]);
+        self.mapped(gpu, &home)
+    }
+
+    /// Waits for the device and reads a whole buffer that can be mapped.
+    pub fn mapped<T: Pod>(&self, gpu: &Gpu, home: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        home.map_async(wgpu::MapMode::Read, .., move |outcome| {
+            // No one listens once the wait below has failed.
+            let _ = sender.send(outcome);
+        });
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| gpu.refused(e))?;
+        receiver.recv_timeout(PATIENCE).map_err(|e| gpu.refused(e))?.map_err(|e| gpu.refused(e))?;
+        let view = home.get_mapped_range(..).map_err(|e| gpu.refused(e))?;
+        let items = view.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect();
+        drop(view);
+        home.unmap();
+        Ok(items)
+    }
+}
+
+/// A buffer for kernels to read and write; never empty, and full of zeros.
+fn storage(gpu: &Gpu, what: &'static str, bytes: usize) -> Result<wgpu::Buffer, GpuError> {
+    gpu.info.holds(what, bytes as u64)?;
+    Ok(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(what),
+        size: (bytes as u64).max(512),
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+        mapped_at_creation: false,
+    }))
+}
+
+fn uniform(gpu: &Gpu, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+    let limit = gpu.device.limits().max_uniform_buffer_binding_size;
+    if bytes.len() as u64 > limit {
+        let device = gpu.info.name.clone();
+        return Err(GpuError::Limit { what: "constants of the scene", needs: bytes.len() as u64, limit, device });
+    }
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("constants"),
+        size: bytes.len() as u64,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    gpu.queue.write_buffer(&buffer, 0, bytes);
+    Ok(buffer)
+}

@@ -1,0 +1,106 @@
+// Contacts of particles of different bodies, the twin of contacts.rs and of the pair constants in model.rs (E10-E14).
+
+// Spring (N/m) and dashpot (N s/m) of a mass that `shared_by` contacts carry, `counted` of them now.
+fn contact_constants(mass: f32, ln_e: f32, shared_by: f32, counted: f32, stated_k: f32, stated_eta: f32) -> vec2<f32> {
+  let k = select(mass * m.contact.x / shared_by, stated_k, stated_k > 0.0);
+  let number = max(shared_by, counted);
+  let eta = dashpot(damping_ratio(ln_e), k * number, mass) / number;
+  return vec2<f32>(k, select(eta, stated_eta, stated_eta >= 0.0));
+}
+
+fn coupling_pair(fluid_mass: f32, body: u32) -> vec2<f32> {
+  let law = bodies[body].law;
+  let stated = bodies[body].stated;
+  return contact_constants(1.0 / (1.0 / fluid_mass + bodies[body].x.w), law.x, 1.0, 1.0, stated.x, stated.y);
+}
+
+// What a particle feels by contacts.
+struct Felt { force: vec3<f32>, contacts: f32, couple: vec3<f32>, sharers: f32, pull: vec3<f32>, stiffness: f32, deep: f32 }
+
+// Tangential force of a pair (E13; Cundall and Strack 1979).
+fn rub(felt: ptr<function, Felt>, a: Body, b: Body, k: f32, part: f32, counted: f32, slip: vec3<f32>, v: vec3<f32>, load: f32, n: vec3<f32>) -> vec3<f32> {
+  var mu = sqrt(max(a.law.w * b.law.w, 0.0));
+  if (a.law.w < 0.0) { mu = b.law.w; } else if (b.law.w < 0.0) { mu = a.law.w; }
+  if (mu <= 0.0) { return vec3<f32>(0.0); }
+  let mass = 1.0 / (a.x.w + b.x.w);
+  let number = max(max(a.law.y, b.law.y), counted);
+  let k_t = TANGENTIAL * k;
+  let eta_t = part * dashpot(TANGENTIAL_DAMPING, k_t / part * number, mass) / number;
+  // both particles remember the slip of a pair of moving bodies
+  let share = select(1.0, 0.5, a.x.w > 0.0 && b.x.w > 0.0);
+  let slid = share * (slip - n * dot(slip, n)) + v * clock.dt;
+  let limit = mu * load;
+  let held = friction(k_t * slid, limit);
+  (*felt).pull += held;
+  (*felt).stiffness += k_t;
+  return friction(held + eta_t * v, limit);
+}
+
+fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kind: u32) {
+  let diameter = m.period.w;
+  let spacing = m.lower.w;
+  var reach_sq = REACH * REACH * diameter * diameter;
+  if (SMOOTH) { reach_sq += spacing * spacing; }
+  let own_slot = info[i].x;
+  let a = bodies[owner];
+  if (kind == STATIC && a.x.w == 0.0) { return; }
+  var near = walk(x, kind);
+  while (next(&near)) {
+    let j = near.at;
+    let body = info[j].y;
+    let d = wrap(records[j].x.xyz - x);
+    let r_sq = dot(d, d);
+    if (r_sq >= reach_sq || body == owner) { continue; }
+    let inverse_mass = a.x.w + bodies[body].x.w;
+    if (inverse_mass == 0.0) { continue; }
+    let b = bodies[body];
+    let r = sqrt(r_sq);
+    let other_slot = info[j].x;
+    var n = d / max(r, 1e-12);
+    var along = d;
+    var s = r;
+    var part = 1.0;
+    var arm = 0.5 * d;   // where they touch, seen from i: midway, or where a ball stands on a face
+    if (SMOOTH) {
+      let f_a = slots[own_slot].facing.xyz;
+      let f_b = slots[other_slot].facing.xyz;
+      let normal = contact_normal(d, r, f_a, f_b);
+      if (any(normal != n) && (any(f_a != vec3<f32>(0.0)) || any(f_b != vec3<f32>(0.0)))) {
+        n = normal;
+        s = dot(d, n);
+        along = n * s;
+        part = contact_part(length(d - along) / spacing);
+        if (all(f_b == vec3<f32>(0.0))) { arm = d - 0.5 * along; }
+        else if (all(f_a == vec3<f32>(0.0))) { arm = 0.5 * along; }
+      }
+    }
+    if (s >= REACH * diameter || part <= 0.0) { continue; }
+    var v = records[j].v.xyz - records[i].v.xyz;
+    if (!FULL_DAMPING) { v -= cross(a.omega.xyz, arm) + cross(b.omega.xyz, d - arm); }
+    let counted = max(a.force.w, b.force.w);
+    var ln_e = 0.5 * (a.law.x + b.law.x);
+    if (a.x.w == 0.0) { ln_e = b.law.x; } else if (b.x.w == 0.0) { ln_e = a.law.x; }
+    let mass = 1.0 / inverse_mass;
+    let k = contact_constants(mass, ln_e, max(a.law.y, b.law.y), counted, max(a.stated.x, b.stated.x), max(a.stated.y, b.stated.y));
+    var f = part * contact_force(along, v, s, diameter, k.x, k.y, NORMAL_ONLY, clock.dt);
+    let speed = dot(v, n);
+    let overlap = diameter - s;
+    let held = max(counted, 1.0) * k.x * (diameter * diameter - overlap * overlap);
+    if (overlap > DEEP * diameter && speed < 0.0 && mass * speed * speed > HELD * held) {
+      // taken within a step if as many contacts as a face has particles share it
+      let stop = select(0.0, mass / (clock.dt * max(a.law.z, b.law.z)), clock.dt > 0.0);
+      f += n * (speed * part * stop);
+      (*felt).deep += 1.0;
+    }
+    if (s < diameter) {
+      (*felt).contacts += 1.0;
+      (*felt).sharers += part;
+      if (!FULL_DAMPING) {
+        let slip = slots[own_slot].slip.xyz - slots[other_slot].slip.xyz;
+        f += rub(felt, a, b, k.x * part, part, counted, slip, v - n * speed, max(-dot(f, n), 0.0), n);
+      }
+    }
+    (*felt).force += f;
+    if (!FULL_DAMPING) { (*felt).couple += cross(arm, f); }
+  }
+}

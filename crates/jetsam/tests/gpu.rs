@@ -1,0 +1,328 @@
+//! The step on the GPU against the CPU: stage by stage from one state, whole scenes, and itself from run to run.
+//!
+//! Needs a device, if only Mesa's software driver; without one the tests show as ignored, and with `JETSAM_REQUIRE_GPU=1` in
+//! the environment they fail.
+
+mod common;
+
+use common::scene;
+use glam::{DVec3, Vec3};
+use jetsam::backend::{Backend, Choice, Cpu, OnGpu};
+use jetsam::gpu::devices;
+use jetsam::integrate::{Advance, bodies::follow};
+use jetsam::stage::Stage;
+use jetsam::state::{Kind, State};
+use jetsam::{World, state_hash};
+use libtest_mimic::{Arguments, Trial, run};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let tests: [(&str, fn()); 6] = [
+        ("stages_agree_in_a_tank_with_bodies", stages_agree_in_a_tank_with_bodies),
+        ("stages_agree_with_every_law", stages_agree_with_every_law),
+        ("stages_agree_in_two_dimensions", stages_agree_in_two_dimensions),
+        ("a_hundred_steps_agree", a_hundred_steps_agree),
+        ("same_bits_from_run_to_run", same_bits_from_run_to_run),
+        ("queued_steps_are_steps", queued_steps_are_steps),
+    ];
+    let absent = devices().is_empty();
+    let required = std::env::var("JETSAM_REQUIRE_GPU").is_ok_and(|v| v == "1");
+    let trial = |(name, test): (&'static str, fn())| {
+        Trial::test(name, move || {
+            test();
+            Ok(())
+        })
+        .with_ignored_flag(absent && !required)
+    };
+    run(&Arguments::from_args(), tests.into_iter().map(trial).collect()).exit_code()
+}
+
+/// Water with boxes in it, that touch each other and the floor.
+const TANK: &str = r#"
+[domain]
+min = [0, 0, 0]
+max = [0.6, 0.4, 0.8]
+[resolution]
+spacing = 0.04
+[[fluid]]
+name = "water"
+density = 1000
+viscosity = 0.1
+shape = { box = { min = [0, 0, 0], max = [0.6, 0.4, 0.3] } }
+velocity = [0.3, 0.1, -0.2]
+[[rigid]]
+name = "light"
+density = 400
+shape = { box = { min = [0.1, 0.1, 0.1], max = [0.26, 0.26, 0.22] } }
+spin = [1, 2, 3]
+friction = 0.5
+[[rigid]]
+name = "on it"
+density = 2000
+shape = { box = { min = [0.14, 0.1, 0.225], max = [0.3, 0.26, 0.34] } }
+velocity = [0.2, 0, -0.5]
+friction = 0.3
+"#;
+
+/// Periodic water and oil with everything that can be asked of pairs.
+const LAWS: &str = r#"
+[domain]
+min = [0, 0, 0]
+max = [0.4, 0.4, 0.6]
+walls = ["periodic", "solid", "open"]
+[resolution]
+spacing = 0.04
+[solver]
+density = "continuity"
+shifting = 1.0
+xsph = 0.2
+vorticity = 0.05
+settle = 0.0
+[[fluid]]
+name = "water"
+density = 1000
+viscosity = 0.5
+surface_tension = 0.07
+shape = { box = { min = [0, 0, 0.1], max = [0.4, 0.4, 0.3] } }
+velocity = [0.4, 0.1, -0.2]
+[[fluid]]
+name = "oil"
+density = 800
+viscosity = 2
+surface_tension = 0.03
+shape = { box = { min = [0, 0, 0.3], max = [0.4, 0.4, 0.4] } }
+velocity = [-0.4, 0.1, 0.2]
+[[force]]
+vortex = { center = [0.2, 0.2, 0.2], axis = [0, 0, 1], speed = 1.0, core = 0.1, rate = 2.0 }
+[[force]]
+point = { center = [0.2, 0.2, 0.5], strength = 0.1, core = 0.2 }
+"#;
+
+const FLAT: &str = r#"
+[world]
+dimensions = 2
+[domain]
+min = [0, 0, 0]
+max = [1.0, 0, 0.8]
+[resolution]
+spacing = 0.025
+[[fluid]]
+name = "water"
+viscosity = 0.1
+shape = { box = { min = [0, 0, 0], max = [0.5, 0, 0.4] } }
+[[rigid]]
+name = "box"
+density = 500
+shape = { box = { min = [0.6, 0, 0.001], max = [0.8, 0, 0.2] } }
+spin = [0, 2, 0]
+"#;
+
+/// The largest difference of vectors, as a fraction of the largest size.
+fn apart(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
+    let size = a.iter().map(|v| Vec3::from(*v).length()).fold(1e-20, f32::max);
+    a.iter().zip(b).map(|(a, b)| (Vec3::from(*a) - Vec3::from(*b)).length()).fold(0.0, f32::max) / size
+}
+
+/// The same for numbers.
+fn apart_numbers(a: &[f32], b: &[f32]) -> f32 {
+    let size = a.iter().map(|v| v.abs()).fold(1e-20, f32::max);
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / size
+}
+
+/// Compares what a stage writes; bars are fractions of the largest value of a field.
+fn compare(stage: Stage, cpu: &State, gpu: &State, bar: f32) {
+    let (a, b) = (&cpu.particles, &gpu.particles);
+    assert_eq!(a.count, b.count, "{stage:?}: counts");
+    let of = |kinds: &[Kind], what: &dyn Fn(&State, usize) -> [f32; 3]| {
+        for &kind in kinds {
+            let range = a.segment(kind);
+            let pick = |state: &State| range.clone().map(|k| what(state, k)).collect::<Vec<_>>();
+            let d = apart(&pick(cpu), &pick(gpu));
+            assert!(d <= bar, "{stage:?}: {kind:?} differ by {d} of the largest");
+        }
+    };
+    let fluid = a.segment(Kind::Fluid);
+    match stage {
+        Stage::Cells => {
+            for kind in Kind::ALL {
+                let range = a.segment(kind);
+                if kind != Kind::Static {
+                    assert_eq!(a.id[range.clone()], b.id[range.clone()], "{stage:?}: order of {kind:?}");
+                    assert_eq!(a.owner[range.clone()], b.owner[range.clone()], "{stage:?}");
+                }
+            }
+            of(&Kind::ALL[..2], &|s, k| s.particles.record[k].x);
+            of(&Kind::ALL[..2], &|s, k| s.particles.record[k].v);
+        }
+        Stage::Pressure | Stage::Boundary => {
+            let d = apart_numbers(&a.density[fluid.clone()], &b.density[fluid]);
+            assert!(d <= bar, "densities differ by {d}");
+            let kinds = if stage == Stage::Pressure { &Kind::ALL[..1] } else { &Kind::ALL[1..] };
+            // pressures are small differences of densities: c^2 makes much of little
+            let size = a.record.iter().map(|r| r.share.abs()).fold(1e-20, f32::max);
+            for &kind in kinds {
+                for k in a.segment(kind) {
+                    let d = (a.record[k].share - b.record[k].share).abs() / size;
+                    assert!(d <= 100.0 * bar, "{stage:?}: {kind:?} {k} differ by {d}");
+                }
+            }
+        }
+        Stage::Gradients if !a.gradient.is_empty() => {
+            of(&Kind::ALL[..1], &|s, k| s.particles.vorticity[k]);
+            of(&Kind::ALL[..1], &|s, k| [0, 1, 2].map(|c| s.particles.gradient[k][c]));
+        }
+        Stage::Forces => {
+            for &kind in &Kind::ALL {
+                let range = a.segment(kind);
+                let d = apart(&a.push[range.clone()], &b.push[range]);
+                assert!(d <= 200.0 * bar, "forces on {kind:?} differ by {d} of the largest");
+            }
+            if !a.carry.is_empty() {
+                let of = |s: &State| fluid.clone().map(|k| s.particles.carry[k][3]).collect::<Vec<_>>();
+                assert!(apart_numbers(&of(cpu), &of(gpu)) <= 100.0 * bar, "rates of density");
+                let of =
+                    |s: &State| fluid.clone().map(|k| [0, 1, 2].map(|c| s.particles.carry[k][c])).collect::<Vec<_>>();
+                assert!(apart(&of(cpu), &of(gpu)) <= 100.0 * bar, "carried velocities");
+            }
+        }
+        Stage::Bodies => {
+            let scale =
+                cpu.bodies.body.iter().filter(|b| !b.is_static()).map(|b| b.force.length()).fold(1e-20, f64::max);
+            for (a, b) in cpu.bodies.body.iter().zip(&gpu.bodies.body) {
+                assert_eq!(a.contacts, b.contacts, "contacts of {}", a.name);
+                let bar = 200.0 * f64::from(bar) * if a.is_static() { a.force.length().max(scale) } else { scale };
+                for (what, a, b) in [("force", a.force, b.force), ("fluid", a.force_fluid, b.force_fluid)] {
+                    assert!((a - b).length() <= bar, "{what}: {a} and {b}, {bar}");
+                }
+                assert!((a.torque - b.torque).length() <= bar, "torque: {} and {}", a.torque, b.torque);
+            }
+        }
+        Stage::Kick | Stage::Drift => {
+            for (a, b) in cpu.bodies.body.iter().zip(&gpu.bodies.body).filter(|(a, _)| !a.is_static()) {
+                assert!((a.x - b.x).length() < 1e-6 && (a.v - b.v).length() < 1e-4, "{}: {} {}", a.name, a.v, b.v);
+                assert!((a.omega - b.omega).length() < 1e-3 * (1.0 + a.omega.length()), "{} {}", a.omega, b.omega);
+            }
+            if stage == Stage::Kick {
+                of(&Kind::ALL[..1], &|s, k| s.particles.record[k].v);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Runs `before` steps on the CPU, then one step on both from the state reached, stage by stage.
+fn stages_agree(text: &str, before: usize) {
+    let mut world = World::from_scene(&scene(text)).unwrap();
+    let mut dt = 0.0;
+    for _ in 0..before {
+        dt = world.step(f64::INFINITY).dt;
+    }
+    let model = world.model().clone();
+    let mut start = world.state().clone();
+    follow(&mut start.bodies, &model);
+    let mut cpu = Cpu::default();
+    let mut gpu = OnGpu::open(false).unwrap_or_else(|e| panic!("{e}"));
+    cpu.upload(&model, start.clone());
+    gpu.upload(&model, start);
+    // both begin by evaluating forces where they stand; then the step
+    let rest = Advance { time: world.time(), ..Advance::default() };
+    let step = Advance { time: world.time(), dt, dt_before: dt, drag: 0.0 };
+    for (advance, evaluates) in [(rest, true), (step, false)] {
+        for stage in Stage::WCSPH.into_iter().filter(|s| !evaluates || s.evaluates()) {
+            cpu.run(stage, &model, advance);
+            gpu.run(stage, &model, advance);
+            assert!(gpu.fault().is_none(), "{:?}", gpu.fault());
+            if stage != Stage::Drift || !evaluates {
+                compare(stage, cpu.download(), gpu.download(), 5e-6);
+            }
+        }
+        let (a, b) = (cpu.ledger(), gpu.ledger());
+        println!("{a:?}\n{b:?}");
+        let near = |what: &str, a: f64, b: f64, scale: f64| {
+            assert!((a - b).abs() <= 1e-4 * scale.abs().max(1e-12), "{what}: {a} and {b}");
+        };
+        assert_eq!((a.fluid, a.lost, a.left, a.nonfinite), (b.fluid, b.lost, b.left, b.nonfinite));
+        near("speed", a.speed, b.speed, a.speed);
+        near("body speed", a.body_speed, b.body_speed, a.body_speed);
+        near("acceleration", a.acceleration, b.acceleration, 10.0 * a.acceleration);
+        near("kinetic", a.kinetic, b.kinetic, a.kinetic);
+        near("potential", a.potential, b.potential, a.potential);
+        near("neighbours", a.neighbours, b.neighbours, a.neighbours);
+        near("density error", a.density_error_mean, b.density_error_mean, 0.01);
+        let vectors = [
+            ("momentum", a.momentum, b.momentum, a.momentum_scale),
+            ("total force", a.total_force, b.total_force, a.force_scale),
+            ("external force", a.external_force, b.external_force, a.force_scale),
+        ];
+        for (what, a, b, scale) in vectors {
+            near(what, DVec3::distance(a, b), 0.0, 10.0 * scale);
+        }
+    }
+}
+
+fn stages_agree_in_a_tank_with_bodies() {
+    stages_agree(TANK, 40);
+}
+
+fn stages_agree_with_every_law() {
+    stages_agree(LAWS, 10);
+}
+
+fn stages_agree_in_two_dimensions() {
+    stages_agree(FLAT, 60);
+}
+
+fn on_gpu(text: &str) -> World {
+    let assembly = scene(text).assemble().unwrap();
+    World::choose(Choice::Gpu, assembly).unwrap_or_else(|e| panic!("{e}")).0
+}
+
+/// After 100 steps of equal length: centre of mass, energies and bodies within 1e-4.
+fn a_hundred_steps_agree() {
+    for text in [TANK, FLAT] {
+        let mut cpu = World::from_scene(&scene(text)).unwrap();
+        let mut gpu = on_gpu(text);
+        let dt = 0.8 * cpu.model().largest_dt(cpu.ledger().speed, cpu.ledger().acceleration).0;
+        for _ in 0..100 {
+            cpu.step(dt);
+            gpu.step(dt);
+        }
+        let (a, b) = (cpu.ledger(), gpu.ledger());
+        println!("{a:?}\n{b:?}");
+        assert_eq!((a.fluid, a.lost, b.lost), (b.fluid, 0, 0));
+        for (what, x, y) in [("kinetic", a.kinetic, b.kinetic), ("potential", a.potential, b.potential)] {
+            assert!((x - y).abs() <= 1e-4 * (a.kinetic + a.potential), "{what}: {x} and {y}");
+        }
+        assert!((a.momentum - b.momentum).length() <= 1e-4 * a.momentum_scale, "{} {}", a.momentum, b.momentum);
+        for (a, b) in cpu.state().bodies.body.iter().zip(&gpu.state().bodies.body) {
+            let size = 1.0; // the domain's
+            assert!((a.x - b.x).length() < 1e-4 * size, "{}: {} and {}", a.name, a.x, b.x);
+        }
+        println!("residuals {:e} {:e}", cpu.momentum_residual(), gpu.momentum_residual());
+        assert!(gpu.momentum_residual() < 1e-4);
+    }
+}
+
+fn same_bits_from_run_to_run() {
+    let hash = || {
+        let mut w = on_gpu(TANK);
+        assert_eq!(w.run_to(0.02), None);
+        (state_hash(w.state()), w.steps())
+    };
+    let first = hash();
+    assert!(first.1 > 20, "{} steps", first.1);
+    assert_eq!(first, hash());
+}
+
+/// A frame queued without waiting ends where it was asked to, with steps that obey E29.
+fn queued_steps_are_steps() {
+    let (mut queued, mut single) = (on_gpu(TANK), on_gpu(TANK));
+    assert_eq!(queued.run_to(0.01), None);
+    single.advance(0.01, |_, r| r.trouble.is_none());
+    assert_eq!(queued.time(), 0.01);
+    assert_eq!((queued.steps(), single.steps()), (single.steps(), queued.steps()));
+    let (a, b) = (queued.ledger(), single.ledger());
+    assert!((a.kinetic - b.kinetic).abs() < 1e-5 * a.kinetic, "{} {}", a.kinetic, b.kinetic);
+    let (dt, _) = queued.model().largest_dt(a.speed, a.acceleration);
+    assert!(0.01 / queued.steps() as f64 <= 1.05 * dt, "{dt}");
+}
