@@ -60,11 +60,23 @@ impl Input {
 /// What computes.
 #[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum Backend {
-    /// The best there is.
+    /// A graphics processor where there is one in fact and the scene can run on it, else the processor.
     #[default]
     Auto,
     /// The processor.
     Cpu,
+    /// A graphics processor, or a software driver where there is no other.
+    Gpu,
+}
+
+impl From<Backend> for jetsam::Choice {
+    fn from(backend: Backend) -> Self {
+        match backend {
+            Backend::Auto => Self::Auto,
+            Backend::Cpu => Self::Cpu,
+            Backend::Gpu => Self::Gpu,
+        }
+    }
 }
 
 #[derive(clap::Args, Clone)]

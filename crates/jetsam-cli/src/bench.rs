@@ -58,7 +58,7 @@ pub fn bench(args: &args::Bench) -> miette::Result<Outcome> {
             wanted => wanted.iter().map(|&n| sized(&scene, n)).collect::<miette::Result<_>>()?,
         };
         for scene in sizes {
-            let case = measure(name, &scene, args.steps, &mut finite)?;
+            let case = measure(name, &scene, args, &mut finite)?;
             if cases == 0 && !args.json {
                 print(HEADER);
             }
@@ -102,20 +102,27 @@ fn crowded(mut scene: Scene, wanted: u64) -> Scene {
     scene
 }
 
-fn measure(name: &str, scene: &Scene, steps: u64, finite: &mut bool) -> miette::Result<Case> {
+/// Steps between two looks at the progress: a GPU makes them without waiting.
+const UNWATCHED: u64 = 100;
+
+fn measure(name: &str, scene: &Scene, args: &args::Bench, finite: &mut bool) -> miette::Result<Case> {
     MEMORY.reset_peak_usage();
-    let mut world = World::from_scene(scene).map_err(|e| *e)?;
+    let steps = args.steps;
+    let (mut world, _) = World::choose(args.backend.into(), scene.assemble().map_err(|e| *e)?)?;
     let bar = progress(steps + steps.div_ceil(5), name);
-    for _ in 0..steps.div_ceil(5) {
-        world.step(f64::INFINITY);
-        bar.inc(1);
-    }
+    let run = |world: &mut World, count: u64| {
+        let mut fine = true;
+        for first in (0..count).step_by(UNWATCHED as usize) {
+            let part = UNWATCHED.min(count - first);
+            fine &= world.run_steps(part).is_none();
+            bar.inc(part);
+        }
+        fine
+    };
+    run(&mut world, steps.div_ceil(5));
     let timers: Vec<Duration> = world.timers().map(|t| t.1).collect();
     let (begin, start) = (world.time(), Instant::now());
-    for _ in 0..steps {
-        *finite &= world.step(f64::INFINITY).trouble.is_none();
-        bar.inc(1);
-    }
+    *finite &= run(&mut world, steps);
     let wall = start.elapsed().as_secs_f64();
     bar.finish_and_clear();
     let count = world.state().particles.count;
@@ -126,7 +133,7 @@ fn measure(name: &str, scene: &Scene, steps: u64, finite: &mut bool) -> miette::
     Ok(Case {
         scene: name.into(),
         backend: world.backend(),
-        device: device(),
+        device: world.device().unwrap_or_else(device),
         particles,
         agents,
         neighbours: if count[Kind::Fluid as usize] > 0 || agents == 0 {

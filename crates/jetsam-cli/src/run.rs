@@ -16,7 +16,10 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     input.set.extend(args.seed.map(|seed| format!("world.seed={seed}")));
     let scene = input.open()?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(name_of(&input.scene)));
-    let mut world = World::from_scene(&scene).map_err(|e| *e)?;
+    let (mut world, why) = World::choose(args.backend.into(), scene.assemble().map_err(|e| *e)?)?;
+    if let Some(why) = why {
+        say(&format!("on the processor: {why}"));
+    }
     for warning in &world.model().warnings {
         say(&format!("warning: {warning}"));
     }
@@ -28,11 +31,15 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     outputs.write(&world, &recorder.frame(&world, Duration::ZERO))?;
     for frame in 1..=times.count {
         let start = Instant::now();
-        world.advance(times.at(frame), |world, step| {
-            outputs.step(world);
-            trouble = step.trouble;
-            trouble.is_none()
-        });
+        if outputs.look_between() {
+            world.advance(times.at(frame), |world, step| {
+                outputs.step(world);
+                trouble = step.trouble;
+                trouble.is_none()
+            });
+        } else {
+            trouble = world.run_to(times.at(frame));
+        }
         let stats = recorder.frame(&world, start.elapsed());
         outputs.write(&world, &stats)?;
         bar.set_message(format!("real-time factor {:.3}", stats.real_time_factor));
@@ -45,6 +52,9 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     outputs.finish()?;
     let summary = recorder.summary(&world);
     say(&describe(&summary, &folder));
+    if let Some(fault) = world.fault() {
+        return Err(fault.clone().into());
+    }
     Ok(judge(&scene, &summary, trouble))
 }
 

@@ -22,7 +22,7 @@ pub fn validate(args: &Validate) -> miette::Result<Outcome> {
     let mut reports = Vec::new();
     for (name, source) in &cases {
         let bar = progress(PARTS as u64, name);
-        let report = run(name, source, &args.set, &mut |variant, part| {
+        let report = run(name, source, &args.set, args.backend.into(), &mut |variant, part| {
             bar.set_message(variant.to_owned());
             bar.set_position((PARTS * part) as u64);
         });

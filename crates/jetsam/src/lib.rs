@@ -66,6 +66,7 @@ pub mod world;
 #[doc = include_str!("../../../README.md")]
 struct Readme;
 
+pub use backend::Choice;
 pub use error::{Error, Result};
 pub use report::{FrameStats, Recorder, Summary, state_hash};
 pub use scene::Scene;

@@ -168,6 +168,19 @@ impl World {
         None
     }
 
+    /// So many steps with nobody looking between them.
+    pub fn run_steps(&mut self, count: u64) -> Option<Trouble> {
+        let end = self.steps + count;
+        while self.steps < end {
+            let most = (end - self.steps) as usize;
+            let report = self.queue(f64::INFINITY, most).unwrap_or_else(|| self.step(f64::INFINITY));
+            if report.trouble.is_some() {
+                return report.trouble;
+            }
+        }
+        None
+    }
+
     /// Steps that the backend makes by itself, at most so long (s) and so many; reports the last.
     fn queue(&mut self, longest: f64, most: usize) -> Option<StepReport> {
         let request = Request { left: longest, dt_before: self.dt_before, drag: 0.0, most };

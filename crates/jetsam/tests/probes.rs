@@ -38,7 +38,7 @@ fn near(reading: f64, expected: f64, tolerance: f64) {
 /// What is said of a scene that is wrong: message and remedy.
 fn refused(text: &str) -> String {
     let source = Source { name: "test".into(), text: text.into(), ..Source::default() };
-    let error = match run("test", &source, &[], &mut |_, _| {}) {
+    let error = match run("test", &source, &[], jetsam::Choice::Cpu, &mut |_, _| {}) {
         Ok(_) => panic!("not refused: {text}"),
         Err(error) => error,
     };
@@ -273,7 +273,7 @@ source = "-g t^2 / 2"
 
 fn verdicts(text: &str) -> Vec<(Verdict, Option<f64>)> {
     let source = Source { name: "test".into(), text: text.into(), ..Source::default() };
-    let report = run("test", &source, &[], &mut |_, _| {}).unwrap_or_else(|e| panic!("{e}"));
+    let report = run("test", &source, &[], jetsam::Choice::Cpu, &mut |_, _| {}).unwrap_or_else(|e| panic!("{e}"));
     assert!(report.plot.starts_with("<svg") && report.plot.ends_with("</svg>\n"));
     report.rows.iter().map(|r| (r.verdict, r.reached)).collect()
 }

@@ -12,7 +12,7 @@ fn main() {
             continue;
         }
         let judge = move || -> Result<(), Failed> {
-            let report = run(&name, &source, &[], &mut |_, _| {}).map_err(|e| e.to_string())?;
+            let report = run(&name, &source, &[], jetsam::Choice::Cpu, &mut |_, _| {}).map_err(|e| e.to_string())?;
             let failed = report.rows.iter().filter(|r| r.verdict == Verdict::Fail);
             let said: Vec<String> = failed
                 .map(|r| {

@@ -20,6 +20,10 @@ use std::path::{Path, PathBuf};
 trait Writer {
     /// A step has ended.
     fn step(&mut self, _: &World) {}
+    /// Whether it has to be called after every step.
+    fn looks_between(&self) -> bool {
+        false
+    }
     /// A frame has ended.
     fn write(&mut self, world: &World, stats: &FrameStats) -> miette::Result<()>;
     /// The run has ended.
@@ -56,7 +60,12 @@ impl Outputs {
         Ok(Self(all))
     }
 
-    /// A step has ended.
+    /// Whether [`Outputs::step`] has to be called after every step.
+    pub fn look_between(&self) -> bool {
+        self.0.iter().any(|w| w.looks_between())
+    }
+
+    /// A step has been made.
     pub fn step(&mut self, world: &World) {
         self.0.iter_mut().for_each(|w| w.step(world));
     }

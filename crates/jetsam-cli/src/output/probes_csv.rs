@@ -29,6 +29,10 @@ impl ProbesCsv {
 }
 
 impl Writer for ProbesCsv {
+    fn looks_between(&self) -> bool {
+        self.sampler.looks_between()
+    }
+
     fn step(&mut self, world: &World) {
         self.sampler.step(world);
     }

@@ -35,6 +35,11 @@ impl Sampler {
         Ok(sampler)
     }
 
+    /// Whether some probe is read between frames: [`Sampler::step`] has then to be called after every step.
+    pub fn looks_between(&self) -> bool {
+        self.probes.intervals.iter().any(Option::is_some)
+    }
+
     /// After every step: reads the probes whose interval is over.
     pub fn step(&mut self, world: &World) {
         let due = |(interval, due): (&Option<f64>, &f64)| interval.is_some() && world.time() >= *due;

@@ -14,6 +14,7 @@ pub mod take;
 
 pub use report::{Report, Row, Verdict, markdown, short};
 
+use crate::backend::Choice;
 use crate::error::Result;
 use crate::formula::Scope;
 use crate::probe::{Probes, Sampler, Series};
@@ -56,19 +57,25 @@ struct Variant {
 }
 
 /// Runs a case and judges it. `overrides` are `key=value` pairs as of `--set`; `progress` hears the variant and the part of
-/// the whole case that is done.
+/// the whole case that is done; the runs are made on `backend`.
 ///
 /// # Errors
 /// Whatever is wrong with the scene, found before the first run where it can be. A run that goes wrong is no error but a row
 /// that fails.
-pub fn run(name: &str, source: &Source, overrides: &[String], progress: &mut dyn FnMut(&str, f64)) -> Result<Report> {
+pub fn run(
+    name: &str,
+    source: &Source,
+    overrides: &[String],
+    backend: Choice,
+    progress: &mut dyn FnMut(&str, f64),
+) -> Result<Report> {
     let base = Scene::parse(source.clone(), overrides)?;
     let variants = variants(&base, source, overrides)?;
     check(&base, &variants)?;
     let mut runs = Vec::new();
     for (k, variant) in variants.iter().enumerate() {
         let n = variants.len() as f64;
-        runs.push(simulate(variant, &mut |part| progress(&variant.name, (k as f64 + part) / n))?);
+        runs.push(simulate(variant, backend, &mut |part| progress(&variant.name, (k as f64 + part) / n))?);
     }
     let rows = rows(name, &base, &variants, &runs)?;
     let plot = plot::plot(&base, &variants, &runs)?;
@@ -141,10 +148,17 @@ fn check(base: &Scene, variants: &[Variant]) -> Result<()> {
 }
 
 /// Runs one variant from its beginning to its end.
-fn simulate(variant: &Variant, progress: &mut dyn FnMut(f64)) -> Result<Run> {
+fn simulate(variant: &Variant, backend: Choice, progress: &mut dyn FnMut(f64)) -> Result<Run> {
     let start = Instant::now();
     let scene = &variant.scene;
-    let mut world = World::from_scene(scene)?;
+    let mut world = match World::choose(backend, scene.assemble()?) {
+        Ok((world, _)) => world,
+        Err(why) => {
+            let trouble = Some(format!("not run: {why}"));
+            let (series, profiles) = (vec![Series::default(); scene.probe.len()], Vec::new());
+            return Ok(Run { variant: variant.name.clone(), series, profiles, seconds: 0.0, particles: 0, trouble });
+        }
+    };
     let mut sampler = Sampler::new(scene, &world)?;
     let mut waiting = profile_times(variant)?;
     let mut profiles = Vec::new();
@@ -152,11 +166,16 @@ fn simulate(variant: &Variant, progress: &mut dyn FnMut(f64)) -> Result<Run> {
     let (end, rate) = (scene.run.seconds, scene.run.frames_per_second);
     let frames = (end * rate - 1e-9).ceil().max(0.0) as u64;
     for frame in 0..=frames {
-        world.advance((frame as f64 / rate).min(end), |world, step| {
-            sampler.step(world);
-            trouble = step.trouble;
-            trouble.is_none()
-        });
+        let until = (frame as f64 / rate).min(end);
+        if sampler.looks_between() {
+            world.advance(until, |world, step| {
+                sampler.step(world);
+                trouble = step.trouble;
+                trouble.is_none()
+            });
+        } else {
+            trouble = world.run_to(until);
+        }
         if frame > 0 {
             sampler.frame(&world);
         }

@@ -222,7 +222,7 @@ impl Backend for OnGpu {
         let last = &self.ledger;
         let (guess, _) = model.largest_dt(last.speed, last.acceleration);
         let wanted = (request.left / guess * 1.02).ceil() + 1.0;
-        let steps = (if wanted.is_finite() { wanted.max(1.0) } else { 1.0 } as usize).min(request.most).min(LOGGED - 1);
+        let steps = (wanted.min(LOGGED as f64 - 1.0) as usize).min(request.most);
         self.write_clock(Clock {
             left: request.left.min(f64::from(f32::MAX)) as f32,
             dt_before: request.dt_before as f32,
