@@ -127,7 +127,8 @@ impl Particles {
         self.count[Kind::Fluid as usize] += 1;
     }
 
-    fn grow(&mut self, more: usize) {
+    /// Makes room for more fluid particles: the segments of bodies move up.
+    pub fn grow(&mut self, more: usize) {
         let (old, total) = (self.first[Kind::Rigid as usize], self.record.len() + more);
         self.record.resize(total, Record::default());
         self.push.resize(total, [0.0; 3]);

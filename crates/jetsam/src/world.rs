@@ -183,7 +183,7 @@ impl World {
 
     /// Steps that the backend makes by itself, at most so long (s) and so many; reports the last.
     fn queue(&mut self, longest: f64, most: usize) -> Option<StepReport> {
-        let request = Request { left: longest, dt_before: self.dt_before, drag: 0.0, most };
+        let request = Request { time: self.time, left: longest, dt_before: self.dt_before, drag: 0.0, most };
         let Batch { steps, stages } = self.backend.queue(&self.model, request)?;
         self.timers.iter_mut().zip(stages).for_each(|(timer, time)| *timer += time);
         let mut last = None;

@@ -5,25 +5,37 @@
 
 mod common;
 
-use common::scene;
+use common::{oracle, scene};
 use glam::{DVec3, Vec3};
+use jetsam::assemble::Assembly;
 use jetsam::backend::{Backend, Choice, Cpu, OnGpu};
 use jetsam::gpu::devices;
 use jetsam::integrate::{Advance, bodies::follow};
 use jetsam::stage::Stage;
 use jetsam::state::{Kind, State};
-use jetsam::{World, state_hash};
+use jetsam::{Trouble, World, state_hash};
 use libtest_mimic::{Arguments, Trial, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let tests: [(&str, fn()); 6] = [
+    let tests: [(&str, fn()); 15] = [
         ("stages_agree_in_a_tank_with_bodies", stages_agree_in_a_tank_with_bodies),
         ("stages_agree_with_every_law", stages_agree_with_every_law),
         ("stages_agree_in_two_dimensions", stages_agree_in_two_dimensions),
         ("a_hundred_steps_agree", a_hundred_steps_agree),
         ("same_bits_from_run_to_run", same_bits_from_run_to_run),
         ("queued_steps_are_steps", queued_steps_are_steps),
+        ("sources_and_sinks_agree", sources_and_sinks_agree),
+        ("scripts_are_followed", scripts_are_followed),
+        ("a_lost_device_is_said", a_lost_device_is_said),
+        ("oracle: a disturbed block in the open", || oracle::a_disturbed_block_in_the_open(gpu_world)),
+        ("oracle: a periodic box", || oracle::a_periodic_box(gpu_world)),
+        ("oracle: a box with walls and a body", || oracle::a_box_with_walls_and_a_body(gpu_world)),
+        ("oracle: density integrated", || oracle::density_integrated(gpu_world)),
+        ("oracle: neighbours on faces of cells and at the edge of the support", || {
+            oracle::neighbours_on_faces_of_cells_and_at_the_edge_of_the_support(gpu_world)
+        }),
+        ("oracle: all particles in one cell", || oracle::all_particles_in_one_cell(gpu_world)),
     ];
     let absent = devices().is_empty();
     let required = std::env::var("JETSAM_REQUIRE_GPU").is_ok_and(|v| v == "1");
@@ -272,9 +284,12 @@ fn stages_agree_in_two_dimensions() {
     stages_agree(FLAT, 60);
 }
 
-fn on_gpu(text: &str) -> World {
-    let assembly = scene(text).assemble().unwrap();
+fn gpu_world(assembly: Assembly) -> World {
     World::choose(Choice::Gpu, assembly).unwrap_or_else(|e| panic!("{e}")).0
+}
+
+fn on_gpu(text: &str) -> World {
+    gpu_world(scene(text).assemble().unwrap())
 }
 
 /// After 100 steps of equal length: centre of mass, energies and bodies within 1e-4.
@@ -325,4 +340,78 @@ fn queued_steps_are_steps() {
     assert!((a.kinetic - b.kinetic).abs() < 1e-5 * a.kinetic, "{} {}", a.kinetic, b.kinetic);
     let (dt, _) = queued.model().largest_dt(a.speed, a.acceleration);
     assert!(0.01 / queued.steps() as f64 <= 1.05 * dt, "{dt}");
+}
+
+/// A hose, bursts, a sink and a lifetime.
+const SOURCES: &str = r#"
+[world]
+gravity = [0, 0, 0]
+[domain]
+min = [0, 0, 0]
+max = [1, 0.4, 0.4]
+walls = ["open", "solid", "solid"]
+[resolution]
+spacing = 0.03
+[[fluid]]
+name = "water"
+density = 1000
+[[fluid]]
+name = "mist"
+density = 500
+lifetime = 0.04
+[[emitter]]
+fluid = "water"
+outlet.hose = { center = [0.2, 0.2, 0.2], axis = [1, 0, 0], radius = 0.09, speed = 2 }
+[[emitter]]
+fluid = "mist"
+outlet.burst = { shape = { box = { min = [0.6, 0.1, 0.1], max = [0.75, 0.3, 0.3] } }, period = 0.03 }
+[[sink]]
+shape = { box = { min = [0.3, 0, 0], max = [0.4, 0.4, 0.4] } }
+"#;
+
+/// E31 on both: what comes and goes when depends on time alone; room has to be made for it on the way.
+fn sources_and_sinks_agree() {
+    let (mut cpu, mut gpu) = (World::from_scene(&scene(SOURCES)).unwrap(), on_gpu(SOURCES));
+    for frame in 1..=5 {
+        let until = 0.02 * f64::from(frame);
+        cpu.run_to(until);
+        assert_eq!(gpu.run_to(until), None, "{:?}", gpu.fault());
+        let (a, b) = (cpu.ledger(), gpu.ledger());
+        println!("{} {} born, {} {} drained, {} {} alive", a.born, b.born, a.drained, b.drained, a.fluid, b.fluid);
+        assert_eq!((a.born, a.drained, a.fluid, a.left), (b.born, b.drained, b.fluid, b.left), "frame {frame}");
+        assert!((a.momentum - b.momentum).length() < 1e-3 * a.momentum_scale, "{} {}", a.momentum, b.momentum);
+    }
+    assert!(gpu.ledger().born > 100 && gpu.ledger().drained > 50, "{:?}", gpu.ledger());
+    assert!(gpu.momentum_residual() < 1e-4, "{}", gpu.momentum_residual());
+    let alive = gpu.state().particles.count[0] as u64;
+    assert_eq!(gpu.ledger().born, alive + gpu.ledger().drained + gpu.ledger().left);
+}
+
+/// E15: a paddle that swings pushes the water as it does on the CPU.
+fn scripts_are_followed() {
+    let text = format!(
+        "{TANK}[[static]]\nname = \"paddle\"\nshape = {{ box = {{ min = [0.45, 0.05, 0.05], max = [0.5, 0.35, 0.6] }} }}\n\
+         motion = {{ rotation = {{ center = [0.475, 0.2, 0.05], axis = [0, 1, 0], rate = 12 }} }}\n"
+    );
+    let (mut cpu, mut gpu) = (World::from_scene(&scene(&text)).unwrap(), on_gpu(&text));
+    cpu.run_to(0.02);
+    assert_eq!(gpu.run_to(0.02), None, "{:?}", gpu.fault());
+    let (a, b) = (cpu.ledger(), gpu.ledger());
+    assert!((a.momentum - b.momentum).length() < 2e-4 * a.momentum_scale, "{} {}", a.momentum, b.momentum);
+    let paddle = |w: &World| w.state().bodies.body.iter().find(|b| b.name == "paddle").unwrap().q;
+    assert!(paddle(&cpu).angle_between(paddle(&gpu)) < 1e-5);
+}
+
+/// A device that is taken out ends a run with an error that names a remedy, not the program.
+fn a_lost_device_is_said() {
+    let assembly = scene(TANK).assemble().unwrap();
+    let model = assembly.model.clone();
+    let mut gpu = OnGpu::open(false).unwrap_or_else(|e| panic!("{e}"));
+    gpu.upload(&model, assembly.state);
+    gpu.lose();
+    gpu.run(Stage::Ledger, &model, Advance::default());
+    let fault = gpu.fault().expect("a fault");
+    assert!(fault.to_string().contains("lost"), "{fault}");
+    gpu.run(Stage::Density, &model, Advance::default());
+    assert_eq!(Trouble::Device.to_string(), "the device failed");
 }

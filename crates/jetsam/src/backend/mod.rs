@@ -45,6 +45,8 @@ pub trait Backend: Send {
 /// Steps that a backend is to make by itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
+    /// Time now (s).
+    pub time: f64,
     /// Time to go (s).
     pub left: f64,
     /// Length of the step before (s).

@@ -12,16 +12,17 @@ fn drift_fluid(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
   let dt = clock.dt;
   let half = select(dt, 0.5 * dt, LEAPFROG);
   var u = r.v.xyz + half * a.xyz;
-  var rates = vec2<f32>(0.0);
+  var rates = vec4<f32>(0.0);
   if (CARRIED) { u += carry[i].xyz; }
   if (CONTINUITY) {
     let old = rate[i];
-    rates = select(old, vec2<f32>(carry[i].w, old.x), dt > 0.0);   // a sort without a step changes nothing
+    rates = select(old, vec4<f32>(carry[i].w, old.x, old.z, 0.0), dt > 0.0);   // a sort without a step changes nothing
     a.w += dt * (rates.x + ahead() * (rates.x - rates.y));
   }
+  if (MORTAL && !CONTINUITY) { rates = rate[i]; }
   let x = home_all(r.x.xyz + dt * u);
   let own = info[i];
-  drifted[i] = Drifted(vec4<f32>(x, r.x.w), vec4<f32>(r.v.xyz + dt * a.xyz, r.v.w), a, own.x, own.y, rates);
+  drifted[i] = Drifted(vec4<f32>(x, r.x.w), vec4<f32>(r.v.xyz + dt * a.xyz, r.v.w), a, rates, own.x, own.y, vec2<u32>(0u));
 }
 
 @compute @workgroup_size(128)

@@ -113,38 +113,53 @@ impl Source {
     }
 }
 
+/// A particle to be born.
+#[derive(Clone, Copy, Debug)]
+pub struct Birth {
+    /// When (s).
+    pub time: f64,
+    /// Where (m).
+    pub x: DVec3,
+    /// Velocity (m/s).
+    pub v: DVec3,
+    /// Its fluid.
+    pub fluid: u32,
+    /// Whether inside a hose: nothing else is asked for room then.
+    pub in_hose: bool,
+}
+
+/// All births in `(from, to]`, source by source in the order of time; at the very beginning those at `from` too.
+pub fn births(model: &Model, from: f64, to: f64) -> impl Iterator<Item = Birth> + '_ {
+    model.sources.iter().flat_map(move |source| {
+        source.births(from, to, from == 0.0).flat_map(move |birth| {
+            let time = source.span[0] + if birth == 0 { 0.0 } else { birth as f64 * source.period };
+            let first = source.given(birth);
+            let left = source.count.saturating_sub(first).min(source.points.len() as u64) as usize;
+            source.points[..left].iter().zip(first..).map(move |(&point, number)| {
+                let shift = [0, 1, 2].map(|a| 2.0 * random::uniform(model.seed, source.stream, 3 * number + a) - 1.0);
+                let mut x = point + source.jitter * DVec3::from(shift);
+                if model.dimensions == 2 {
+                    x.y = 0.0;
+                }
+                Birth { time, x, v: source.velocity, fluid: source.fluid, in_hose: source.bore.is_some() }
+            })
+        })
+    })
+}
+
 /// Fluid born in the step from `time` to `time + dt`, appended to the fluid's segment, which grows where it must.
 /// Returns its momentum (kg m/s).
 pub fn bear(p: &mut Particles, model: &Model, time: f64, dt: f64, next_id: &mut u32) -> DVec3 {
     let mut momentum = DVec3::ZERO;
-    for source in &model.sources {
-        for birth in source.births(time, time + dt, time == 0.0) {
-            let born_at = source.span[0] + if birth == 0 { 0.0 } else { birth as f64 * source.period };
-            let late = time + dt - born_at;
-            for (k, &point) in source.points.iter().enumerate() {
-                let number = source.given(birth) + k as u64;
-                if number >= source.count {
-                    break;
-                }
-                let shift = [0, 1, 2].map(|a| 2.0 * random::uniform(model.seed, source.stream, 3 * number + a) - 1.0);
-                let mut x = point + source.velocity * late + source.jitter * DVec3::from(shift);
-                if model.dimensions == 2 {
-                    x.y = 0.0;
-                }
-                if source.bore.is_some() || has_room(p, model, x) {
-                    let mut x = x.as_vec3().to_array();
-                    model.grid.wrap(&mut x);
-                    let v = source.velocity.as_vec3().to_array();
-                    p.append(
-                        Record { x, volume: model.volume as f32, v, share: 0.0 },
-                        *next_id,
-                        source.fluid,
-                        time + dt,
-                    );
-                    *next_id += 1;
-                    momentum += f64::from(model.fluids[source.fluid as usize].mass) * source.velocity;
-                }
-            }
+    for birth in births(model, time, time + dt) {
+        let x = birth.x + birth.v * (time + dt - birth.time);
+        if birth.in_hose || has_room(p, model, x) {
+            let mut x = x.as_vec3().to_array();
+            model.grid.wrap(&mut x);
+            let v = birth.v.as_vec3().to_array();
+            p.append(Record { x, volume: model.volume as f32, v, share: 0.0 }, *next_id, birth.fluid, time + dt);
+            *next_id += 1;
+            momentum += f64::from(model.fluids[birth.fluid as usize].mass) * birth.v;
         }
     }
     momentum

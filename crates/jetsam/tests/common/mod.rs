@@ -2,6 +2,8 @@
 
 #![allow(dead_code)] // each test file uses some
 
+pub mod oracle;
+
 use jetsam::scene::Source;
 use jetsam::{Scene, World};
 

@@ -4,10 +4,18 @@
 struct Fluid {
   density: f32, mass: f32, viscosity: f32, stiffness: f32,
   artificial: f32, cohesion: f32, curvature: f32, diffusion: f32,
+  lifetime: f32, unused_a: f32, unused_b: f32, unused_c: f32,
 }
 
 // E30. kind: 0 point gravity, 1 wind, 2 vortex.
 struct Field { place: vec4<f32>, axis: vec4<f32>, kind: u32, strength: f32, core: f32, rate: f32 }
+
+// E31. Inside of a hose: start and length, axis and radius, velocity and number of the fluid.
+struct Hose { start: vec4<f32>, axis: vec4<f32>, velocity: vec4<f32> }
+// What a sink takes in. kind 0: box (low, high); 1: ball (centre, radius); 2: cylinder (start, length; axis, radius).
+struct Drain { low: vec4<f32>, high: vec4<f32>, begin: f32, end: f32, kind: u32, unused: u32 }
+// A particle to be born. x.w: when (s since the frame began); v.w: number of the fluid, negative less one inside a hose.
+struct Birth { x: vec4<f32>, v: vec4<f32>, room: vec4<u32> }
 
 struct Constants {
   lower: vec4<f32>,       // where particles may be (m); w: spacing (m)
@@ -26,13 +34,16 @@ struct Constants {
   more: vec4<u32>,        // parts of bodies, blocks of the scan, groups of the ledger, axes that are open (bits)
   fluids: array<Fluid, FLUIDS>,
   fields: array<Field, FIELDS>,
+  hoses: array<Hose, HOSES>,
+  drains: array<Drain, DRAINS>,
 }
 
 // As `state::Record`: place and volume, velocity and pressure share.
 struct Record { x: vec4<f32>, v: vec4<f32> }
 
 // A particle after its drift, before the sort. push: acceleration and D of fluids, (0, 0, 0, 1/mass of its body) of bodies' particles.
-struct Drifted { x: vec4<f32>, v: vec4<f32>, push: vec4<f32>, id: u32, owner: u32, rate: vec2<f32> }
+// rate: rates of density one and two steps ago, and when the particle was born (s).
+struct Drifted { x: vec4<f32>, v: vec4<f32>, push: vec4<f32>, rate: vec4<f32>, id: u32, owner: u32, unused: vec2<u32> }
 
 struct Body {
   x: vec4<f32>,           // centre of mass (m); w: 1/mass as forces feel it, 0 if they do not move it
@@ -77,7 +88,10 @@ struct Clock {
   step: u32,               // steps of this frame so far
   live: u32,               // fluid particles before the sort
   bound: u32, own: u32,    // own: 1 where kernels choose dt, 0 where the host has
-  unused: vec2<u32>,
+  time: f32, elapsed: f32, // when the frame began (s), and how long ago that was
+  births: u32, born: u32,  // births behind us in the list, and particles ever born from it
+  listed: u32, next_id: u32,
+  crossed: vec4<f32>,      // momentum of what was born in this step
 }
 
 // What a step leaves behind, as `ledger::Ledger`.
@@ -110,11 +124,14 @@ struct Sums {
 @group(0) @binding(15) var<storage, read_write> parts: array<Part>;
 @group(0) @binding(16) var<storage, read_write> part_sums: array<PartSum>;
 @group(0) @binding(17) var<storage, read_write> carry: array<vec4<f32>>;    // fluid
-@group(0) @binding(18) var<storage, read_write> rate: array<vec2<f32>>;     // fluid
+@group(0) @binding(18) var<storage, read_write> rate: array<vec4<f32>>;     // fluid: see Drifted
 @group(0) @binding(19) var<storage, read_write> gradient: array<vec4<f32>>; // fluid
 @group(0) @binding(20) var<storage, read_write> vorticity: array<vec4<f32>>;// fluid
 @group(0) @binding(21) var<storage, read_write> sums: array<Sums>;          // groups of the ledger
 @group(0) @binding(22) var<storage, read_write> log: array<Sums>;           // 0: the last step; then one a step
+
+@group(0) @binding(23) var<storage, read_write> births: array<Birth>;
+@group(0) @binding(24) var<storage, read_write> held: array<vec4<f32>>;     // force that holds fluid inside hoses (N)
 
 const GONE: u32 = 0xffffffffu;
 // Bins behind the cells of a kind: left, lost, not finite, drained or not used.

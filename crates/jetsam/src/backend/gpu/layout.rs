@@ -1,6 +1,7 @@
 //! Rust's side of the structures of `common.wgsl`: constants from a model, bodies and slots to and from a state.
 
-use super::program::fields;
+use super::program::{fields, hoses};
+use crate::integrate::sources::DrainRegion;
 use crate::model::Model;
 use crate::scene::{Force, Wall};
 use crate::state::{Body, State};
@@ -45,9 +46,10 @@ pub struct Drifted {
     pub x: V,
     pub v: V,
     pub push: V,
+    pub rate: V,
     pub id: u32,
     pub owner: u32,
-    pub rate: [f32; 2],
+    pub unused: [u32; 2],
 }
 
 /// A body.
@@ -121,7 +123,22 @@ pub struct Clock {
     pub live: u32,
     pub bound: u32,
     pub own: u32,
-    pub unused: [u32; 2],
+    pub time: f32,
+    pub elapsed: f32,
+    pub births: u32,
+    pub born: u32,
+    pub listed: u32,
+    pub next_id: u32,
+    pub crossed: V,
+}
+
+/// A particle to be born.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Birth {
+    pub x: V,
+    pub v: V,
+    pub room: [u32; 4],
 }
 
 /// What a step leaves behind.
@@ -217,9 +234,10 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
     for f in &model.fluids {
         let numbers = [f.density, f.mass, f.viscosity, f.stiffness, f.artificial, f.cohesion, f.curvature, f.diffusion];
         bytes.extend(bytemuck::bytes_of(&numbers));
+        bytes.extend(bytemuck::bytes_of(&[f.lifetime.min(f64::from(f32::MAX)) as f32, 0.0, 0.0, 0.0]));
     }
     if model.fluids.is_empty() {
-        bytes.extend([0; 32]);
+        bytes.extend([0; 48]);
     }
     let mut any = false;
     for field in fields(model) {
@@ -238,6 +256,27 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         bytes.extend(bytemuck::bytes_of(&numbers.map(|n| n as f32)));
     }
     if !any {
+        bytes.extend([0; 48]);
+    }
+    for (bore, velocity, fluid) in hoses(model) {
+        bytes.extend(bytemuck::bytes_of(&single(bore.start, bore.length as f32)));
+        bytes.extend(bytemuck::bytes_of(&single(bore.axis, bore.radius as f32)));
+        bytes.extend(bytemuck::bytes_of(&single(velocity, fluid as f32)));
+    }
+    if hoses(model).next().is_none() {
+        bytes.extend([0; 48]);
+    }
+    for drain in &model.drains {
+        let (low, high, kind) = match drain.region {
+            DrainRegion::Box { min, max } => (single(min, 0.0), single(max, 0.0), 0u32),
+            DrainRegion::Ball { center, radius } => (single(center, radius as f32), [0.0; 4], 1),
+            DrainRegion::Cylinder(b) => (single(b.start, b.length as f32), single(b.axis, b.radius as f32), 2),
+        };
+        bytes.extend(bytemuck::bytes_of(&[low, high]));
+        bytes.extend(bytemuck::bytes_of(&drain.span.map(|t| t.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32)));
+        bytes.extend(bytemuck::bytes_of(&[kind, 0]));
+    }
+    if model.drains.is_empty() {
         bytes.extend([0; 48]);
     }
     bytes
@@ -375,10 +414,14 @@ mod tests {
                 assert_eq!(span as usize, size_of::<$rust>(), "{}", $wgsl);
             }};
         }
-        same!("Drifted", Drifted, x, v, push, id, owner, rate);
+        same!("Drifted", Drifted, x, v, push, rate, id, owner);
+        same!("Birth", Birth, x, v, room);
         same!("Slot", Slot, offset, normal, facing, slip, owner, place);
         same!("Touch", Touch, fluid, contact, couple, slip);
-        same!("Clock", Clock, dt, dt_before, left, drag, gravity, fastest, running, step, live, bound, own);
+        same!(
+            "Clock", Clock, dt, dt_before, left, drag, gravity, fastest, running, step, live, bound, own, time,
+            elapsed, births, born, listed, next_id, crossed
+        );
         same!("Sums", Sums, step, energy, momentum, outer, total, crossed, count, more);
         same!(
             "Body",

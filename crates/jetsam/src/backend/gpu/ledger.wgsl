@@ -24,6 +24,7 @@ fn of_fluid(i: u32) -> Sums {
   var outside = clock.gravity.xyz + fields_at(r.x.xyz, r.v.xyz);
   if (VORTICITY) { outside += vorticity[i].xyz; }
   s.outer = vec4<f32>(fluid.mass * outside, 0.0);
+  if (HAS_HOSES > 0u) { s.outer += held[i]; }
   s.energy = vec4<f32>(0.5 * fluid.mass * speed * speed, -fluid.mass * dot(m.gravity.xyz, r.x.xyz - m.corner.xyz), fluid.mass * s.step.w, 0.0);
   let near = bitcast<u32>(before[i].w);
   s.crossed.w = f32(near & 0xffffu) - 1.0;
@@ -102,6 +103,8 @@ fn total(@builtin(local_invocation_index) l: u32) {
       let p = m.fluids[info[i].y].mass * records[i].v.xyz;
       if (finite(p.x + p.y + p.z)) { sum.crossed -= vec4<f32>(p, 0.0); }
     }
+    sum.crossed += vec4<f32>(clock.crossed.xyz, 0.0);
+    clock.crossed = vec4<f32>(0.0);
   }
   var all = in_group(l, sum);
   if (l != 0u || clock.running == 0u) { return; }
@@ -119,6 +122,7 @@ fn total(@builtin(local_invocation_index) l: u32) {
   clock.dt_before = clock.dt;
   clock.step += 1u;
   clock.left -= clock.dt;
+  clock.elapsed += clock.dt;
 }
 
 // The length of the next step, where kernels choose it: the twin of `World::next_dt` and `Model::largest_dt`.

@@ -10,6 +10,7 @@ mod transfer;
 use super::{Backend, Batch, Request};
 use crate::gpu::{Gpu, GpuError};
 use crate::integrate::Advance;
+use crate::integrate::sources::{self, Birth};
 use crate::ledger::Ledger;
 use crate::model::{DtBound, Model};
 use crate::stage::Stage;
@@ -17,6 +18,7 @@ use crate::state::State;
 use glam::DVec3;
 use layout::{Clock, GpuBody, Pose, Sizes, Sums, double};
 use program::{BOUNDS, Kernelet, Over, Program};
+use std::collections::VecDeque;
 use std::mem::size_of;
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -24,6 +26,8 @@ use transfer::Buffers;
 
 /// Most steps whose statistics are kept until they come home.
 const LOGGED: usize = 512;
+/// Most births that are listed at once.
+const LISTED: usize = 1 << 16;
 /// Steps in one submission: a display must not wait for long.
 const SUBMITTED: usize = 8;
 
@@ -37,6 +41,9 @@ pub struct OnGpu {
     ready: Option<Ready>,
     ledger: Ledger,
     clock: Clock,
+    /// Births to come, in the order of time, and until when they are known (s).
+    coming: VecDeque<Birth>,
+    known: f64,
     /// A drift was made since the last sort.
     drifted: bool,
     fault: Option<GpuError>,
@@ -66,10 +73,6 @@ pub fn unsupported(model: &Model) -> Option<&'static str> {
     if !model.flocks.is_empty() {
         return Some("flocks");
     }
-    let mortal = model.fluids.iter().any(|f| f.lifetime.is_finite());
-    if !model.sources.is_empty() || !model.drains.is_empty() || mortal {
-        return Some("sources and sinks of fluid");
-    }
     None
 }
 
@@ -86,6 +89,8 @@ impl OnGpu {
             ready: None,
             ledger: Ledger::default(),
             clock: Clock::default(),
+            coming: VecDeque::new(),
+            known: 0.0,
             drifted: false,
             fault: None,
         })
@@ -94,6 +99,12 @@ impl OnGpu {
     /// Its name and how it is reached.
     pub fn device(&self) -> String {
         format!("{} ({})", self.gpu.info.name, self.gpu.info.api)
+    }
+
+    /// As if the device were taken out.
+    #[doc(hidden)]
+    pub fn lose(&self) {
+        self.gpu.device.destroy();
     }
 
     fn prepare(&mut self, model: &Model, state: &State) -> Result<(), GpuError> {
@@ -105,12 +116,11 @@ impl OnGpu {
                 let reason = format!("kernels use {} buffers, it allows {most}", program.most_buffers());
                 return Err(gpu.refused(reason));
             }
-            let (buffers, sizes) = Buffers::new(gpu, model, state, LOGGED)?;
+            let (buffers, sizes) =
+                Buffers::new(gpu, model, state, LOGGED, if model.sources.is_empty() { 0 } else { LISTED })?;
             let groups = |over| folded(gpu, groups(over, sizes));
             let stage = |stage: Stage| {
-                let wanted = |name: &str| {
-                    (name != "gradients" || model.wants_gradients()) && (sizes.bodies > 0 || !name.contains("bod"))
-                };
+                let wanted = |name| program::wanted(name, model, sizes.bodies > 0);
                 let kernels = program::kernels(stage).iter().filter(|(name, _)| wanted(name));
                 let made = kernels.map(|&(name, over)| (program.kernel(gpu, name, &buffers.all), groups(over)));
                 (stage, made.filter(|(_, g)| g[0] > 0).collect())
@@ -180,7 +190,13 @@ impl Backend for OnGpu {
             self.fault = Some(fault);
         }
         let live = state.particles.count[0] as u32;
-        self.write_clock(Clock { live, gravity: layout::single(model.gravity, 0.0), ..Clock::default() });
+        (self.coming, self.known) = (VecDeque::new(), 0.0);
+        self.write_clock(Clock {
+            live,
+            next_id: live,
+            gravity: layout::single(model.gravity, 0.0),
+            ..Clock::default()
+        });
         self.start = state;
     }
 
@@ -189,14 +205,14 @@ impl Backend for OnGpu {
         if stage == Stage::Drift || (stage == Stage::Cells && !self.drifted) {
             let gravity = layout::single(model.gravity_at(advance.end()), 0.0);
             let (dt, drag) = (advance.dt as f32, advance.drag as f32);
-            let (live, fastest) = (self.clock.live, self.clock.fastest);
+            let listed = self.list_births(model, advance.time, advance.end());
             let dt_before = advance.dt_before as f32;
-            self.write_clock(Clock { dt, dt_before, drag, gravity, live, fastest, running: 1, ..Clock::default() });
+            self.write_clock(Clock { dt, dt_before, drag, gravity, running: 1, own: 0, ..listed });
             self.scripts(model, advance);
         }
         self.drifted = stage == Stage::Drift || (self.drifted && stage != Stage::Cells);
         let undrifted = stage == Stage::Cells && !self.drifted && self.clock.dt == 0.0;
-        let sums = self.attempt(|gpu, ready| {
+        let found = self.attempt(|gpu, ready| {
             let mut commands = gpu.device.create_command_encoder(&Default::default());
             // what is sorted is what has drifted: without a drift, all stay where they are
             let before = ready.stages.iter().filter(|(s, _)| undrifted && *s == Stage::Drift);
@@ -205,12 +221,14 @@ impl Backend for OnGpu {
             }
             gpu.queue.submit([commands.finish()]);
             if stage != Stage::Ledger {
-                return Ok(Vec::new());
+                return Ok(None);
             }
-            ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 0, 1)
+            let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 0, 1)?;
+            Ok(Some((sums, ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1)?)))
         });
-        if stage == Stage::Ledger {
-            self.take(model, &sums.unwrap_or_default());
+        if let Some((sums, clock)) = found.flatten() {
+            self.take(model, &sums);
+            self.settle_births(clock[0]);
         }
     }
 
@@ -223,15 +241,17 @@ impl Backend for OnGpu {
         let (guess, _) = model.largest_dt(last.speed, last.acceleration);
         let wanted = (request.left / guess * 1.02).ceil() + 1.0;
         let steps = (wanted.min(LOGGED as f64 - 1.0) as usize).min(request.most);
+        let ahead = (1.5 * guess * steps as f64).min(request.left);
+        let listed = self.list_births(model, request.time, request.time + ahead);
         self.write_clock(Clock {
             left: request.left.min(f64::from(f32::MAX)) as f32,
             dt_before: request.dt_before as f32,
             drag: request.drag as f32,
             running: 1,
             own: 1,
-            ..Clock { step: 0, ..self.clock }
+            ..listed
         });
-        let (sums, ticks) = self.attempt(|gpu, ready| {
+        let (sums, ticks, clock) = self.attempt(|gpu, ready| {
             let mut made = 0;
             while made < steps {
                 let mut commands = gpu.device.create_command_encoder(&Default::default());
@@ -255,8 +275,9 @@ impl Backend for OnGpu {
                 Some(timers) => timers.read(gpu, &ready.buffers)?,
                 None => Vec::new(),
             };
-            Ok((sums[..done].to_vec(), ticks))
+            Ok((sums[..done].to_vec(), ticks, clock[0]))
         })?;
+        self.settle_births(clock);
         let mut batch = Batch::default();
         for s in &sums {
             self.take(model, std::slice::from_ref(s));
@@ -290,6 +311,48 @@ impl Backend for OnGpu {
 }
 
 impl OnGpu {
+    /// Lists what is born from `from` to `to` (s) for the kernels, and makes room for it. Returns the clock of a frame that
+    /// begins at `from`.
+    fn list_births(&mut self, model: &Model, from: f64, to: f64) -> Clock {
+        let clock = Clock { time: from as f32, elapsed: 0.0, births: 0, born: 0, listed: 0, step: 0, ..self.clock };
+        if model.sources.is_empty() || to <= from {
+            return clock;
+        }
+        // at the beginning `known` is 0, and so is `from`
+        let mut fresh: Vec<Birth> = sources::births(model, self.known.max(from), to).collect();
+        fresh.sort_by(|a, b| a.time.total_cmp(&b.time));
+        self.coming.extend(fresh);
+        self.known = to.max(self.known);
+        let listed = self.coming.len().min(LISTED);
+        let room = self.ready.as_ref().map_or(0, |r| r.sizes.fluids as usize);
+        if self.clock.live as usize + listed > room {
+            self.grow(model, listed.max(room / 2));
+        }
+        let births: Vec<layout::Birth> = self.coming.iter().take(listed).map(|b| listed_birth(b, from)).collect();
+        self.attempt(|gpu, ready| {
+            gpu.queue.write_buffer(ready.buffers.births(), 0, bytemuck::cast_slice(&births));
+            Ok(())
+        });
+        Clock { listed: listed as u32, ..clock }
+    }
+
+    /// Takes what was born off the list.
+    fn settle_births(&mut self, clock: Clock) {
+        self.coming.drain(..(clock.births as usize).min(self.coming.len()));
+        self.ledger.born += u64::from(clock.born);
+        self.clock.next_id = clock.next_id;
+    }
+
+    /// Makes room for more fluid: the state goes home and comes back.
+    fn grow(&mut self, model: &Model, more: usize) {
+        let mut state = self.download().clone();
+        state.particles.grow(more);
+        if let Err(fault) = self.prepare(model, &state) {
+            self.fault = Some(fault);
+        }
+        self.start = state;
+    }
+
     /// Bodies that follow scripts take the poses of the end of a step (E15).
     fn scripts(&mut self, model: &Model, advance: Advance) {
         if advance.drag > 0.0 || advance.dt == 0.0 || model.paths.iter().all(Option::is_none) {
@@ -311,6 +374,13 @@ impl OnGpu {
     }
 }
 
+/// A birth as kernels read it, in a frame that begins at `from` (s).
+fn listed_birth(b: &Birth, from: f64) -> layout::Birth {
+    let fluid = b.fluid as f32;
+    let x = layout::single(b.x, (b.time - from) as f32);
+    layout::Birth { x, v: layout::single(b.v, if b.in_hose { -fluid - 1.0 } else { fluid }), room: [0; 4] }
+}
+
 /// Workgroups of a kernel.
 fn groups(over: Over, s: Sizes) -> u32 {
     match over {
@@ -323,6 +393,7 @@ fn groups(over: Over, s: Sizes) -> u32 {
         Over::Bodies(size) => s.bodies.div_ceil(size),
         Over::Parts => s.parts,
         Over::Groups => s.groups,
+        Over::Births(size) => (LISTED as u32).div_ceil(size),
         Over::One => 1,
     }
 }

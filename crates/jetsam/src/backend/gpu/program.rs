@@ -5,6 +5,7 @@
 
 use super::GpuError;
 use crate::gpu::Gpu;
+use crate::integrate::sources::Bore;
 use crate::interact::contacts::{DEEP, HELD};
 use crate::interact::pairs::SHIFTED_ABOVE;
 use crate::interact::pressure::BELOW_SUM;
@@ -13,6 +14,7 @@ use crate::model::{CONTACT_REACH, DtBound, Model, TANGENTIAL, TANGENTIAL_DAMPING
 use crate::scene::{Coupling, Damping, Density, EquationOfState, Force, Integrator, PressureForce, Surface, Viscosity};
 use crate::stage::Stage;
 use crate::world::TRAVEL;
+use glam::DVec3;
 use std::fmt::Write as _;
 use wgpu::naga;
 
@@ -29,7 +31,7 @@ pub const BOUNDS: [DtBound; 8] = [
 ];
 
 /// The texts, in the order of the step.
-const TEXTS: [&str; 12] = [
+const TEXTS: [&str; 13] = [
     include_str!("../../laws/kernel.wgsl"),
     include_str!("../../laws/fluid.wgsl"),
     include_str!("../../laws/contact.wgsl"),
@@ -38,6 +40,7 @@ const TEXTS: [&str; 12] = [
     include_str!("../../integrate/particles.wgsl"),
     include_str!("../../integrate/bodies.wgsl"),
     include_str!("../../interact/cells.wgsl"),
+    include_str!("../../integrate/sources.wgsl"),
     include_str!("../../interact/density.wgsl"),
     include_str!("../../interact/boundary.wgsl"),
     include_str!("../../interact/gradients.wgsl"),
@@ -69,6 +72,8 @@ pub enum Over {
     Parts,
     /// Groups of the ledger.
     Groups,
+    /// Births of a frame.
+    Births(u32),
     /// One workgroup.
     One,
 }
@@ -91,11 +96,12 @@ pub fn kernels(stage: Stage) -> &'static [(&'static str, Over)] {
         Stage::Pressure => &[("pressure", Fluids(128))],
         Stage::Boundary => &[("boundary", BodyParticles(128))],
         Stage::Gradients => &[("gradients", Fluids(128))],
-        Stage::Forces => &[("forces_fluid", Fluids(128)), ("forces_body", BodyParticles(128))],
+        Stage::Forces => &[("forces_fluid", Fluids(128)), ("forces_body", BodyParticles(128)), ("hold", Fluids(128))],
         Stage::Bodies => &[("sum_parts", Parts), ("sum_bodies", Bodies(64))],
         Stage::Kick => &[("kick_fluid", Fluids(128)), ("kick_bodies", Bodies(64))],
         Stage::Ledger => &[("tally", Groups), ("total", One)],
-        Stage::Sources | Stage::Agents => &[],
+        Stage::Agents => &[],
+        Stage::Sources => &[("room", Births(64)), ("bear", One), ("drain", Fluids(128))],
     }
 }
 
@@ -126,6 +132,7 @@ pub fn text(model: &Model) -> String {
         ("TENSION", tension),
         ("VORTICITY", s.vorticity > 0.0),
         ("CARRIED", s.xsph > 0.0 || s.shifting > 0.0 || continuity),
+        ("MORTAL", mortal(model)),
         ("WALLS_SLIP", s.walls_slip),
         ("LEAPFROG", s.integrator == Integrator::Leapfrog),
         ("SMOOTH", s.surface == Surface::Smooth),
@@ -146,6 +153,10 @@ pub fn text(model: &Model) -> String {
         ("FLUIDS", model.fluids.len().max(1)),
         ("FIELDS", fields(model).count().max(1)),
         ("HAS_FIELDS", fields(model).count()),
+        ("HOSES", hoses(model).count().max(1)),
+        ("HAS_HOSES", hoses(model).count()),
+        ("DRAINS", model.drains.len().max(1)),
+        ("HAS_DRAINS", model.drains.len()),
         ("BY_SOUND", bound_code(DtBound::Sound)),
         ("BY_FORCE", bound_code(DtBound::Force)),
         ("BY_TRAVEL", bound_code(DtBound::Travel)),
@@ -177,6 +188,27 @@ pub fn text(model: &Model) -> String {
 /// Fields that are not part of gravity.
 pub fn fields(model: &Model) -> impl Iterator<Item = &Force> {
     model.fields.iter().filter(|f| !matches!(f, Force::Shake(_)))
+}
+
+/// The insides of hoses, with the velocity and the fluid of each.
+pub fn hoses(model: &Model) -> impl Iterator<Item = (Bore, DVec3, u32)> {
+    model.sources.iter().filter_map(|s| s.bore.map(|bore| (bore, s.velocity, s.fluid)))
+}
+
+/// Whether some fluid has a lifetime.
+pub fn mortal(model: &Model) -> bool {
+    model.fluids.iter().any(|f| f.lifetime.is_finite())
+}
+
+/// Whether a kernel has anything to do in a scene.
+pub fn wanted(name: &str, model: &Model, bodies: bool) -> bool {
+    match name {
+        "gradients" => model.wants_gradients(),
+        "room" | "bear" => !model.sources.is_empty(),
+        "drain" => !model.drains.is_empty() || mortal(model),
+        "hold" => hoses(model).next().is_some(),
+        _ => bodies || !(name.contains("bod") || name.contains("part")),
+    }
 }
 
 /// Name of a kernel's functions in `laws/kernel.wgsl`.

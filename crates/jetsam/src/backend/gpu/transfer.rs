@@ -1,6 +1,7 @@
 //! Buffers of a world on the device, and the ways of a state there and back.
 
-use super::layout::{self, BINS, Drifted, GONE, GpuBody, Sizes, Slot, Sums, Touch, three, vec, with};
+use super::layout::{self, BINS, Birth, Drifted, GONE, GpuBody, Sizes, Slot, Sums, Touch, three, vec, with};
+use super::program::{hoses, mortal};
 use crate::gpu::{Gpu, GpuError};
 use crate::interact::cells::Grid;
 use crate::model::Model;
@@ -62,7 +63,13 @@ impl Walls {
 
 impl Buffers {
     /// Makes the buffers of a world and fills them.
-    pub fn new(gpu: &Gpu, model: &Model, state: &State, logged: usize) -> Result<(Self, Sizes), GpuError> {
+    pub fn new(
+        gpu: &Gpu,
+        model: &Model,
+        state: &State,
+        logged: usize,
+        listed: usize,
+    ) -> Result<(Self, Sizes), GpuError> {
         let p = &state.particles;
         let parts = layout::parts(state);
         let cells: u64 = model.grid.cells.iter().map(|&c| c as u64).product();
@@ -105,11 +112,13 @@ impl Buffers {
             make("parts of bodies", parts.len() * 16)?,
             make("sums of parts", parts.len() * 96)?,
             make("carried velocities", fluid_or(carried) * 16)?,
-            make("rates of density", fluid_or(continuity) * 8)?,
+            make("rates of density", fluid_or(continuity || mortal(model)) * 16)?,
             make("gradients", fluid_or(model.wants_gradients()) * 16)?,
             make("vorticities", fluid_or(model.wants_gradients()) * 16)?,
             make("sums of groups", sizes.groups as usize * size_of::<Sums>())?,
             make("statistics", (logged + 1) * size_of::<Sums>())?,
+            make("births", listed * size_of::<Birth>())?,
+            make("forces of hoses", fluid_or(hoses(model).next().is_some()) * 16)?,
         ];
         let buffers = Self { all: buffers };
         buffers.fill(gpu, model, state, &walls, &parts, sizes);
@@ -142,8 +151,11 @@ impl Buffers {
         if !p.carry.is_empty() {
             write(17, 0, bytemuck::cast_slice(&p.carry[..n]));
         }
-        if !p.rate.is_empty() {
-            write(18, 0, bytemuck::cast_slice(&p.rate[..n]));
+        if !(p.rate.is_empty() && p.born.is_empty()) {
+            let pair = |k: usize| p.rate.get(k).copied().unwrap_or_default();
+            let rates: Vec<_> =
+                (0..n).map(|k| [pair(k)[0], pair(k)[1], p.born.get(k).copied().unwrap_or(0.0), 0.0]).collect();
+            write(18, 0, bytemuck::cast_slice(&rates));
         }
     }
 
@@ -180,8 +192,10 @@ impl Buffers {
         if !p.carry.is_empty() {
             p.carry[..live].copy_from_slice(&self.fetch(gpu, &self.all[17], 0, live)?);
         }
-        if !p.rate.is_empty() {
-            p.rate[..live].copy_from_slice(&self.fetch(gpu, &self.all[18], 0, live)?);
+        if !(p.rate.is_empty() && p.born.is_empty()) {
+            let rates: Vec<[f32; 4]> = self.fetch(gpu, &self.all[18], 0, live)?;
+            p.rate.iter_mut().zip(&rates).for_each(|(to, r)| *to = [r[0], r[1]]);
+            p.born.iter_mut().zip(&rates).for_each(|(to, r)| *to = r[2]);
         }
         if !p.gradient.is_empty() {
             p.gradient[..live].copy_from_slice(&self.fetch(gpu, &self.all[19], 0, live)?);
@@ -217,6 +231,11 @@ impl Buffers {
     /// Statistics of steps: the last, then one a step.
     pub fn log(&self) -> &wgpu::Buffer {
         &self.all[22]
+    }
+
+    /// The list of births.
+    pub fn births(&self) -> &wgpu::Buffer {
+        &self.all[23]
     }
 
     /// Waits for the device and reads `count` items of a buffer, from number `first` on.
