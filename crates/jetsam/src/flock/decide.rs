@@ -168,7 +168,7 @@ fn steer(view: View, own: usize, i: usize, sums: &Sums) -> Vec3 {
     a += vec3!(flock::alignment(v, mean.to_array(), w.alignment));
     // oneself is no place to be drawn to
     if sums.drawn > 1.0 {
-        a += vec3!(flock::cohesion((sums.place / (sums.drawn - 1.0)).to_array(), w.cohesion));
+        a += vec3!(flock::cohere((sums.place / (sums.drawn - 1.0)).to_array(), w.cohesion));
     }
     a += vec3!(flock::cruise(v, u.speed, w.cruise));
     if let Some((goal, slow)) = rule.goal {

@@ -40,68 +40,6 @@ fn histogram(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: ve
   atomicAdd(&counts[bin(i)], 1u);
 }
 
-// Exclusive sums of the counts: inside blocks of 2048, over the blocks, and both together.
-const SCANNED: u32 = 8u;
-var<workgroup> scan_sums: array<u32, 256>;
-
-// Sums over a workgroup: of all invocations before this one, and of all.
-fn scan_group(l: u32, own: u32) -> vec2<u32> {
-  scan_sums[l] = own;
-  workgroupBarrier();
-  for (var reach = 1u; reach < 256u; reach *= 2u) {
-    var left = 0u;
-    if (l >= reach) { left = scan_sums[l - reach]; }
-    workgroupBarrier();
-    scan_sums[l] += left;
-    workgroupBarrier();
-  }
-  let result = vec2<u32>(scan_sums[l] - own, scan_sums[255]);
-  workgroupBarrier();
-  return result;
-}
-
-@compute @workgroup_size(256)
-fn scan_blocks(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
-  let block = g.y * n.x + g.x;
-  let total = bins_of(STATIC);
-  let base = (block * 256u + l) * SCANNED;
-  var own = 0u;
-  for (var k = base; k < base + SCANNED; k += 1u) {
-    if (k < total) { own += atomicLoad(&counts[k]); }
-  }
-  let sum = scan_group(l, own);
-  var at = sum.x;
-  for (var k = base; k < base + SCANNED; k += 1u) {
-    if (k < total && clock.running != 0u) {
-      starts[k] = at;
-      at += atomicLoad(&counts[k]);
-    }
-  }
-  if (l == 0u && block < m.more.y) { blocks[block] = sum.y; }
-}
-
-@compute @workgroup_size(256)
-fn scan_tops(@builtin(local_invocation_index) l: u32) {
-  var before_all = 0u;
-  for (var base = 0u; base < m.more.y; base += 256u) {
-    let k = base + l;
-    var own = 0u;
-    if (k < m.more.y) { own = blocks[k]; }
-    let sum = scan_group(l, own);
-    if (k < m.more.y) { blocks[k] = before_all + sum.x; }
-    before_all += sum.y;
-  }
-}
-
-@compute @workgroup_size(256)
-fn scan_add(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
-  let k = number(g, n, l, 256u);
-  if (clock.running == 0u || k >= bins_of(STATIC)) { return; }
-  let at = starts[k] + blocks[k / (256u * SCANNED)];
-  starts[k] = at;
-  atomicStore(&counts[k], at);
-}
-
 @compute @workgroup_size(256)
 fn scatter(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let i = number(g, n, l, 256u);

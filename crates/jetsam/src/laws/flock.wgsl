@@ -36,7 +36,7 @@ fn alignment(v: vec3<f32>, mean: vec3<f32>, rate: f32) -> vec3<f32> {
 }
 
 // E22 cohesion: towards the mean place of those seen, `mean` relative to oneself. rate_sq = weight / T^2.
-fn cohesion(mean: vec3<f32>, rate_sq: f32) -> vec3<f32> {
+fn cohere(mean: vec3<f32>, rate_sq: f32) -> vec3<f32> {
   return mean * rate_sq;
 }
 

@@ -25,6 +25,7 @@ struct Constants {
   period: vec4<f32>,      // length of periodic axes (m), 0 for others; w: contact diameter (m)
   gravity: vec4<f32>,     // without shaking (m/s^2); w: speed of sound (m/s)
   corner: vec4<f32>,      // where potential energy is zero (m); w: neighbours of a full support
+  far_corner: vec4<f32>,  // the other end of the domain (m)
   kernel: vec4<f32>,      // factors of W, of G; W at one spacing, W at no distance
   tune: vec4<f32>,        // factor of the Laplacian; softening (m^2); XSPH; shifting
   contact: vec4<f32>,     // square of the rate (1/s^2) that makes springs of masses; vorticity times spacing (m)
@@ -104,6 +105,7 @@ struct Sums {
   crossed: vec4<f32>,      // w: sum of neighbours
   count: vec4<u32>,        // fluid alive, left, lost, not finite
   more: vec4<u32>,         // drained, rigid lost, with full support, fast contacts
+  impulse: vec4<f32>,      // that agents took by themselves
 }
 
 @group(0) @binding(0) var<uniform> m: Constants;
@@ -128,10 +130,54 @@ struct Sums {
 @group(0) @binding(19) var<storage, read_write> gradient: array<vec4<f32>>; // fluid
 @group(0) @binding(20) var<storage, read_write> vorticity: array<vec4<f32>>;// fluid
 @group(0) @binding(21) var<storage, read_write> sums: array<Sums>;          // groups of the ledger
-@group(0) @binding(22) var<storage, read_write> log: array<Sums>;           // 0: the last step; then one a step
+@group(0) @binding(22) var<storage, read_write> history: array<Sums>;           // 0: the last step; then one a step
 
 @group(0) @binding(23) var<storage, read_write> births: array<Birth>;
 @group(0) @binding(24) var<storage, read_write> held: array<vec4<f32>>;     // force that holds fluid inside hoses (N)
+@group(0) @binding(25) var<storage, read_write> agents: array<Agent>;
+@group(0) @binding(26) var<storage, read_write> strewn: array<Agent>;       // before the sort
+@group(0) @binding(27) var<storage, read_write> agent_starts: array<u32>;
+@group(0) @binding(28) var<storage, read_write> agent_counts: array<atomic<u32>>;
+@group(0) @binding(29) var<storage, read_write> agent_order: array<u32>;
+@group(0) @binding(30) var<storage, read_write> agent_blocks: array<u32>;
+@group(0) @binding(31) var<storage, read_write> crowd: Crowd;
+
+// A flock: as flock::FlockConstants, and its clock. lead: place and velocity of its first agent.
+struct Rule {
+  lead_x: vec4<f32>, lead_v: vec4<f32>,
+  goal: vec4<f32>,      // w: distance of slowing down, negative without a goal
+  radii: vec4<f32>,     // separation, alignment, cohesion, the largest
+  limits: vec4<f32>,    // speed, slowest, fastest, acceleration
+  pull: vec4<f32>,      // weights: separation, alignment, cohesion, cruise
+  drive: vec4<f32>,     // wander, its time, seek, follow
+  fear: vec4<f32>,      // flee, chase, avoid, noise
+  sense: vec4<f32>,     // sight, view (2 all around), rate of turning, look-ahead
+  body: vec4<f32>,      // size, clearance, contact diameter, margin of solid sides
+  matter: vec4<f32>,    // mass (0: none), half_area, margin of open sides, distance behind the leader
+  time: vec4<f32>,      // now, until the next decision, between decisions
+  kind: vec4<u32>,      // 0 Reynolds, 1 Couzin, 2 Vicsek; first agent; agents; relations, two bits a flock
+  who: vec4<u32>,       // leader or GONE; 1 keeps to fluids, 2 flees bodies, 4 flees fluids; seed
+  count: vec4<u32>,     // decisions, due, topological neighbours
+}
+struct Agent {
+  x: vec4<f32>,         // w: id (bits)
+  v: vec4<f32>,         // w: flock (bits)
+  next: vec4<f32>,
+  rest: vec4<f32>,
+  force: vec4<f32>,
+  drag: vec4<f32>,      // force of fluids; w: 1 over the mass of fluid felt
+  own: vec4<f32>,       // momentum it took by itself in this step
+  felt: vec4<f32>,      // velocity at which it felt what is around
+}
+struct Crowd {
+  origin: vec4<f32>,    // of the agents' cells; w: width wished for (m), 0 for topological neighbours
+  per_cell: vec4<f32>,  // w: the smallest side of a cell (m)
+  cells: vec4<u32>,     // w: cells of one flock
+  number: vec4<u32>,    // agents, flocks, most cells, groups of the ledger
+  low: array<atomic<u32>, 4>,
+  high: array<atomic<u32>, 4>,
+  rules: array<Rule>,
+}
 
 const GONE: u32 = 0xffffffffu;
 // Bins behind the cells of a kind: left, lost, not finite, drained or not used.
@@ -248,6 +294,24 @@ fn fields_at(x: vec3<f32>, v: vec3<f32>) -> vec3<f32> {
   }
   if (FLAT) { total.y = 0.0; }
   return total;
+}
+
+// Sums over a workgroup of 256: of all invocations before this one, and of all.
+const SCANNED: u32 = 8u;
+var<workgroup> scan_sums: array<u32, 256>;
+fn scan_group(l: u32, own: u32) -> vec2<u32> {
+  scan_sums[l] = own;
+  workgroupBarrier();
+  for (var reach = 1u; reach < 256u; reach *= 2u) {
+    var left = 0u;
+    if (l >= reach) { left = scan_sums[l - reach]; }
+    workgroupBarrier();
+    scan_sums[l] += left;
+    workgroupBarrier();
+  }
+  let result = vec2<u32>(scan_sums[l] - own, scan_sums[255]);
+  workgroupBarrier();
+  return result;
 }
 
 // Quaternions, the real part last.

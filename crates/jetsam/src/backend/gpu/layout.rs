@@ -1,6 +1,7 @@
 //! Rust's side of the structures of `common.wgsl`: constants from a model, bodies and slots to and from a state.
 
 use super::program::{fields, hoses};
+use crate::flock::FlockConstants;
 use crate::integrate::sources::DrainRegion;
 use crate::model::Model;
 use crate::scene::{Force, Wall};
@@ -30,6 +31,7 @@ pub struct Constants {
     pub period: V,
     pub gravity: V,
     pub corner: V,
+    pub far_corner: V,
     pub kernel: V,
     pub tune: V,
     pub contact: V,
@@ -153,6 +155,7 @@ pub struct Sums {
     pub crossed: V,
     pub count: [u32; 4],
     pub more: [u32; 4],
+    pub impulse: V,
 }
 
 /// Three numbers and a fourth.
@@ -193,6 +196,10 @@ pub struct Sizes {
     pub cells: u32,
     /// Groups of the ledger.
     pub groups: u32,
+    /// Agents.
+    pub agents: u32,
+    /// Most cells of agents, all flocks together.
+    pub agent_cells: u32,
 }
 
 impl Sizes {
@@ -222,6 +229,7 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         period: with(g.period, model.contact_diameter as f32),
         gravity: single(model.gravity, model.sound_speed as f32),
         corner: single(g.min, model.full_support as f32),
+        far_corner: single(g.max, 0.0),
         kernel: [f.w, f.g, f.w_spacing, f.w_own],
         tune: [f.laplacian, model.softening(), s.xsph as f32, s.shifting as f32],
         contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 0.0, 0.0],
@@ -305,13 +313,14 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
         let inertia = b.inverse_inertia;
         let first = parts.iter().position(|p| p[0] == k as u32).unwrap_or(0);
         let count = b.slots.len().div_ceil(PART);
+        let radius = state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max);
         let particle = if b.is_static() { 0.0 } else { b.mass / b.slots.len().max(1) as f64 };
         GpuBody {
             pose: pose(b),
             v_half: single(b.v_half, 0.0),
             l: single(b.l, 0.0),
             l_half: single(b.l_half, 0.0),
-            inertia: [inertia.x_axis, inertia.y_axis, inertia.z_axis].map(|c| single(c, 0.0)),
+            inertia: [single(inertia.x_axis, radius as f32), single(inertia.y_axis, 0.0), single(inertia.z_axis, 0.0)],
             force: single(b.force, b.sharers),
             torque: single(b.torque, 0.0),
             law: [c.ln_restitution, c.shared_by, c.face, c.friction],
@@ -362,6 +371,132 @@ pub fn slots(state: &State, place: impl Fn(usize) -> u32) -> Vec<Slot> {
         unused: [0; 2],
     };
     (0..b.offset.len()).map(slot).collect()
+}
+
+/// An agent.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Agent {
+    pub x: V,
+    pub v: V,
+    pub next: V,
+    pub rest: V,
+    pub force: V,
+    pub drag: V,
+    pub own: V,
+    pub felt: V,
+}
+
+/// A flock: as [`FlockConstants`], and its clock.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Rule {
+    pub lead_x: V,
+    pub lead_v: V,
+    pub goal: V,
+    pub radii: V,
+    pub limits: V,
+    pub pull: V,
+    pub drive: V,
+    pub fear: V,
+    pub sense: V,
+    pub body: V,
+    pub matter: V,
+    pub time: V,
+    pub kind: [u32; 4],
+    pub who: [u32; 4],
+    pub count: [u32; 4],
+}
+
+/// `Crowd` without its rules.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Crowd {
+    pub origin: V,
+    pub per_cell: V,
+    pub cells: [u32; 4],
+    pub number: [u32; 4],
+    pub low: [u32; 4],
+    pub high: [u32; 4],
+}
+
+/// Agents, flock by flock.
+pub fn agents(model: &Model, state: &State) -> Vec<Agent> {
+    let a = &state.agents;
+    let agent = |(f, i): (u32, usize)| Agent {
+        x: with(a.record[i].x, f32::from_bits(a.id[i])),
+        v: with(a.record[i].v, f32::from_bits(f)),
+        next: with(a.next[i], 0.0),
+        rest: with(a.rest[i], 0.0),
+        force: with(a.force.get(i).copied().unwrap_or_default(), 0.0),
+        ..Agent::default()
+    };
+    let all = model.flocks.iter().enumerate().flat_map(|(f, flock)| flock.range().map(move |i| (f as u32, i)));
+    all.map(agent).collect()
+}
+
+/// Brings agents home.
+pub fn to_agents(from: &[Agent], rules: &[Rule], state: &mut State) {
+    let to = &mut state.agents;
+    for (i, a) in from.iter().enumerate() {
+        to.id[i] = a.x[3].to_bits();
+        (to.record[i].x, to.record[i].v) = (three(a.x), three(a.v));
+        (to.next[i], to.rest[i]) = (three(a.next), three(a.rest));
+        if let Some(force) = to.force.get_mut(i) {
+            *force = three(a.force);
+        }
+    }
+    for (clock, rule) in to.clock.iter_mut().zip(rules) {
+        clock.time = f64::from(rule.time[0]);
+        clock.wait = f64::from(rule.time[1]);
+        clock.decisions = u64::from(rule.count[0]);
+    }
+}
+
+/// What is known of the crowd, and the rules of its flocks.
+pub fn crowd(model: &Model, state: &State, sizes: Sizes) -> Vec<u8> {
+    let largest = model.flocks.iter().max_by_key(|f| f.count);
+    let width = largest.filter(|f| f.neighbours == 0).map_or(0.0, |f| 1.0001 * f.radius);
+    let flocks = model.flocks.len() as u32;
+    let groups = sizes.agents.div_ceil(128);
+    let head = Crowd {
+        origin: [0.0, 0.0, 0.0, width],
+        number: [sizes.agents, flocks, sizes.agent_cells / flocks.max(1), groups],
+        ..Crowd::default()
+    };
+    let mut bytes = bytemuck::bytes_of(&head).to_vec();
+    for (f, clock) in model.flocks.iter().zip(&state.agents.clock) {
+        bytes.extend(bytemuck::bytes_of(&rule(model, f, clock)));
+    }
+    bytes
+}
+
+fn rule(model: &Model, f: &FlockConstants, clock: &crate::state::Clock) -> Rule {
+    let (u, w) = (&f.limits, &f.weights);
+    let relations = f.relations.iter().enumerate().map(|(k, r)| (*r as u32) << (2 * k)).sum();
+    let flags = u32::from(f.keep_to_fluids) | u32::from(f.flee_bodies) << 1 | u32::from(f.flee_fluids) << 2;
+    let matter = f.matter.map_or([0.0; 2], |m| [m.mass, m.half_area]);
+    Rule {
+        goal: f.goal.map_or([0.0, 0.0, 0.0, -1.0], |(goal, slow)| with(goal, slow)),
+        radii: [f.separation_radius, f.alignment_radius, f.cohesion_radius, f.radius],
+        limits: [u.speed, u.slowest, u.fastest, u.acceleration],
+        pull: [w.separation, w.alignment, w.cohesion, w.cruise],
+        drive: [w.wander, w.wander_time as f32, w.seek, w.follow],
+        fear: [w.flee, w.chase, w.avoid, f.noise as f32],
+        sense: [f.sight, f.view.unwrap_or(2.0), u.turn.min(1e30) as f32, f.look_ahead],
+        body: [
+            f.size,
+            f.clearance(model.spacing as f32),
+            f.contact(model.spacing, model.solver.contact_overlap) as f32,
+            f.margin[0],
+        ],
+        matter: [matter[0], matter[1], f.margin[1], f.leader.map_or(0.0, |l| l.1)],
+        time: [clock.time as f32, clock.wait as f32, f.tau as f32, 0.0],
+        kind: [f.model as u32, f.first as u32, f.count as u32, relations],
+        who: [f.leader.map_or(GONE, |l| l.0 as u32), flags, f.seed as u32, (f.seed >> 32) as u32],
+        count: [clock.decisions as u32, 0, f.neighbours as u32, 0],
+        ..Rule::default()
+    }
 }
 
 /// As in `state::Touch`.
@@ -422,7 +557,12 @@ mod tests {
             "Clock", Clock, dt, dt_before, left, drag, gravity, fastest, running, step, live, bound, own, time,
             elapsed, births, born, listed, next_id, crossed
         );
-        same!("Sums", Sums, step, energy, momentum, outer, total, crossed, count, more);
+        same!("Sums", Sums, step, energy, momentum, outer, total, crossed, count, more, impulse);
+        same!("Agent", Agent, x, v, next, rest, force, drag, own, felt);
+        same!(
+            "Rule", Rule, lead_x, lead_v, goal, radii, limits, pull, drive, fear, sense, body, matter, time, kind, who,
+            count
+        );
         same!(
             "Body",
             GpuBody,

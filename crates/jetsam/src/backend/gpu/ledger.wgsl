@@ -9,7 +9,7 @@ fn both(a: Sums, b: Sums) -> Sums {
     vec4<f32>(a.energy.xyz + b.energy.xyz, max(a.energy.w, b.energy.w)),
     a.momentum + b.momentum, a.outer + b.outer,
     vec4<f32>(a.total.xyz + b.total.xyz, max(a.total.w, b.total.w)),
-    a.crossed + b.crossed, a.count + b.count, a.more + b.more);
+    a.crossed + b.crossed, a.count + b.count, a.more + b.more, a.impulse + b.impulse);
 }
 
 fn of_fluid(i: u32) -> Sums {
@@ -95,7 +95,9 @@ fn tally(@builtin(workgroup_id) g: vec3<u32>, @builtin(local_invocation_index) l
 @compute @workgroup_size(128)
 fn total(@builtin(local_invocation_index) l: u32) {
   var sum = Sums();
-  for (var k = l; k < m.more.z; k += GROUP) { sum = both(sum, sums[k]); }
+  var groups = m.more.z;
+  if (HAS_FLOCKS) { groups += crowd.number.w; }
+  for (var k = l; k < groups; k += GROUP) { sum = both(sum, sums[k]); }
   // momentum of fluid that left in this step, in the order of bins
   let live = live_fluid();
   if (clock.running != 0u && l == 0u) {
@@ -115,8 +117,8 @@ fn total(@builtin(local_invocation_index) l: u32) {
   all.count = vec4<u32>(live, starts[c + 1u] - live, starts[c + 2u] - starts[c + 1u], all.count.w + starts[c + 3u] - starts[c + 2u]);
   all.more.x = clock.live - starts[c + 3u];
   all.more.y = starts[r + 2u] - starts[r + 1u];
-  log[0] = all;
-  log[1u + clock.step] = all;
+  history[0] = all;
+  history[1u + clock.step] = all;
   clock.live = live;
   clock.fastest = all.step.z;
   clock.dt_before = clock.dt;
@@ -129,9 +131,17 @@ fn total(@builtin(local_invocation_index) l: u32) {
 @compute @workgroup_size(1)
 fn choose() {
   if (clock.own == 0u) { return; }
-  let left = clock.left;
+  var left = clock.left;
   if (left <= 0.0) { clock.running = 0u; return; }
-  let last = log[0];
+  var end = BY_FRAME;
+  if (HAS_FLOCKS) {
+    // a step ends where a decision is due
+    for (var f = 0u; f < crowd.number.y; f += 1u) {
+      let t = crowd.rules[f].time;
+      if (t.z > 0.0 && t.y < left) { left = t.y; end = BY_FLOCK; }
+    }
+  }
+  let last = history[0];
   var dt = m.step.w;
   var bound = BY_SCENE;
   if (dt == 0.0) {
@@ -148,7 +158,7 @@ fn choose() {
   }
   if (dt >= left) {
     dt = left;
-    bound = BY_FRAME;
+    bound = end;
   } else if (left < 1e30) {
     // whole steps: what is left is cut evenly
     let steps = ceil(left / dt * 0.999999);

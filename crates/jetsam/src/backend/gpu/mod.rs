@@ -15,7 +15,6 @@ use crate::ledger::Ledger;
 use crate::model::{DtBound, Model};
 use crate::stage::Stage;
 use crate::state::State;
-use glam::DVec3;
 use layout::{Clock, GpuBody, Pose, Sizes, Sums, double};
 use program::{BOUNDS, Kernelet, Over, Program};
 use std::collections::VecDeque;
@@ -70,8 +69,11 @@ pub fn unsupported(model: &Model) -> Option<&'static str> {
     if !model.joints.is_empty() {
         return Some("joints");
     }
-    if !model.flocks.is_empty() {
-        return Some("flocks");
+    if model.flocks.len() > 16 {
+        return Some("more than sixteen flocks");
+    }
+    if model.flocks.iter().any(|f| f.neighbours > 16) {
+        return Some("more than sixteen topological neighbours");
     }
     None
 }
@@ -393,6 +395,9 @@ fn groups(over: Over, s: Sizes) -> u32 {
         Over::Bodies(size) => s.bodies.div_ceil(size),
         Over::Parts => s.parts,
         Over::Groups => s.groups,
+        Over::Agents(size) => s.agents.div_ceil(size),
+        Over::AgentCells(size) => (s.agent_cells + 2).div_ceil(size),
+        Over::Particles(size) => (s.fluids + s.slots).div_ceil(size),
         Over::Births(size) => (LISTED as u32).div_ceil(size),
         Over::One => 1,
     }
@@ -442,7 +447,7 @@ fn to_ledger(s: &Sums, before: &Ledger) -> Ledger {
         momentum_scale: number(s.momentum[3]),
         crossed: double(s.crossed),
         external_force: double(s.outer),
-        external_impulse: DVec3::ZERO,
+        external_impulse: double(s.impulse),
         total_force: double(s.total),
         force_scale: number(s.energy[2]),
         kinetic: number(s.energy[0]),

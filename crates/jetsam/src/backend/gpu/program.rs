@@ -4,6 +4,7 @@
 //! no other, as devices allow few.
 
 use super::GpuError;
+use super::layout::BLOCK;
 use crate::gpu::Gpu;
 use crate::integrate::sources::Bore;
 use crate::interact::contacts::{DEEP, HELD};
@@ -11,7 +12,9 @@ use crate::interact::pairs::SHIFTED_ABOVE;
 use crate::interact::pressure::BELOW_SUM;
 use crate::laws::kernel::Kernel;
 use crate::model::{CONTACT_REACH, DtBound, Model, TANGENTIAL, TANGENTIAL_DAMPING};
-use crate::scene::{Coupling, Damping, Density, EquationOfState, Force, Integrator, PressureForce, Surface, Viscosity};
+use crate::scene::{
+    Coupling, Damping, Density, EquationOfState, Force, Integrator, PressureForce, Surface, Viscosity, Wall,
+};
 use crate::stage::Stage;
 use crate::world::TRAVEL;
 use glam::DVec3;
@@ -31,11 +34,12 @@ pub const BOUNDS: [DtBound; 8] = [
 ];
 
 /// The texts, in the order of the step.
-const TEXTS: [&str; 13] = [
+const TEXTS: [&str; 16] = [
     include_str!("../../laws/kernel.wgsl"),
     include_str!("../../laws/fluid.wgsl"),
     include_str!("../../laws/contact.wgsl"),
     include_str!("../../laws/field.wgsl"),
+    include_str!("../../laws/flock.wgsl"),
     include_str!("common.wgsl"),
     include_str!("../../integrate/particles.wgsl"),
     include_str!("../../integrate/bodies.wgsl"),
@@ -49,6 +53,8 @@ const TEXTS: [&str; 13] = [
         include_str!("../../interact/forces.wgsl"),
         include_str!("ledger.wgsl")
     ),
+    include_str!("../../flock/agents.wgsl"),
+    include_str!("../../flock/decide.wgsl"),
 ];
 
 /// Over what a kernel runs, and how many invocations make a workgroup.
@@ -72,6 +78,12 @@ pub enum Over {
     Parts,
     /// Groups of the ledger.
     Groups,
+    /// Agents.
+    Agents(u32),
+    /// Cells of agents, flock by flock.
+    AgentCells(u32),
+    /// Places of fluids and particles of all bodies.
+    Particles(u32),
     /// Births of a frame.
     Births(u32),
     /// One workgroup.
@@ -99,8 +111,22 @@ pub fn kernels(stage: Stage) -> &'static [(&'static str, Over)] {
         Stage::Forces => &[("forces_fluid", Fluids(128)), ("forces_body", BodyParticles(128)), ("hold", Fluids(128))],
         Stage::Bodies => &[("sum_parts", Parts), ("sum_bodies", Bodies(64))],
         Stage::Kick => &[("kick_fluid", Fluids(128)), ("kick_bodies", Bodies(64))],
-        Stage::Ledger => &[("tally", Groups), ("total", One)],
-        Stage::Agents => &[],
+        Stage::Ledger => &[("tally", Groups), ("tally_agents", Agents(128)), ("total", One)],
+        Stage::Agents => &[
+            ("travel", Agents(64)),
+            ("crowd_clock", One),
+            ("agent_bounds", Agents(256)),
+            ("agent_grid", One),
+            ("agent_clear", AgentCells(256)),
+            ("agent_histogram", Agents(256)),
+            ("agent_scan_blocks", AgentCells(BLOCK)),
+            ("agent_scan_tops", One),
+            ("agent_scan_add", AgentCells(256)),
+            ("agent_scatter", Agents(256)),
+            ("agent_gather", Agents(256)),
+            ("decide", Agents(64)),
+            ("give", Particles(128)),
+        ],
         Stage::Sources => &[("room", Births(64)), ("bear", One), ("drain", Fluids(128))],
     }
 }
@@ -120,6 +146,7 @@ pub fn text(model: &Model) -> String {
         ("FLAT", flat),
         ("PERIODIC", periodic.contains(&true)),
         ("HAS_FLUIDS", !model.fluids.is_empty()),
+        ("HAS_FLOCKS", !model.flocks.is_empty()),
         ("CONTINUITY", continuity),
         ("COUPLED_BY_PRESSURE", s.coupling == Coupling::Pressure),
         ("TAIT", s.equation_of_state == EquationOfState::Tait),
@@ -162,6 +189,8 @@ pub fn text(model: &Model) -> String {
         ("BY_TRAVEL", bound_code(DtBound::Travel)),
         ("BY_SCENE", bound_code(DtBound::Scene)),
         ("BY_FRAME", bound_code(DtBound::Frame)),
+        ("BY_FLOCK", bound_code(DtBound::Flock)),
+        ("SOLID", (0..3).filter(|&a| model.grid.walls[a] == Wall::Solid).map(|a| 1 << a).sum()),
         ("BY_CONSTANT", bound_code(constant)),
     ];
     // writing to a string does not fail
@@ -182,7 +211,16 @@ pub fn text(model: &Model) -> String {
     for part in TEXTS {
         text.push_str(part);
     }
+    text.push_str(&scan("scan", ["counts", "starts", "blocks"], "bins_of(STATIC)"));
+    text.push_str(&scan("agent_scan", ["agent_counts", "agent_starts", "agent_blocks"], "agent_total()"));
     text
+}
+
+/// The kernels of a scan.
+fn scan(name: &str, [counts, starts, blocks]: [&str; 3], total: &str) -> String {
+    let text = include_str!("scan.wgsl").split_once("\n\n").map_or("", |t| t.1);
+    let names = [("NAME", name), ("COUNTS", counts), ("STARTS", starts), ("BLOCKS", blocks), ("TOTAL", total)];
+    names.iter().fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
 }
 
 /// Fields that are not part of gravity.
@@ -207,6 +245,9 @@ pub fn wanted(name: &str, model: &Model, bodies: bool) -> bool {
         "room" | "bear" => !model.sources.is_empty(),
         "drain" => !model.drains.is_empty() || mortal(model),
         "hold" => hoses(model).next().is_some(),
+        "give" => model.flocks.iter().any(|f| f.matter.is_some()),
+        "travel" | "crowd_clock" | "decide" => !model.flocks.is_empty(),
+        name if name.contains("agent") => !model.flocks.is_empty(),
         _ => bodies || !(name.contains("bod") || name.contains("part")),
     }
 }

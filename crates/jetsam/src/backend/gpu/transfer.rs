@@ -1,6 +1,8 @@
 //! Buffers of a world on the device, and the ways of a state there and back.
 
-use super::layout::{self, BINS, Birth, Drifted, GONE, GpuBody, Sizes, Slot, Sums, Touch, three, vec, with};
+use super::layout::{
+    self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, GONE, GpuBody, Rule, Sizes, Slot, Sums, Touch, three, vec, with,
+};
 use super::program::{hoses, mortal};
 use crate::gpu::{Gpu, GpuError};
 use crate::interact::cells::Grid;
@@ -77,6 +79,7 @@ impl Buffers {
         let fluids = p.first[Kind::Rigid as usize] as u32;
         let rigid = state.bodies.rigid_slots as u32;
         let slots = state.bodies.record.len() as u32;
+        let agents = state.agents.record.len() as u32;
         let sizes = Sizes {
             fluids,
             rigid,
@@ -85,6 +88,8 @@ impl Buffers {
             parts: parts.len() as u32,
             cells: cells as u32,
             groups: (fluids + rigid).div_ceil(512).clamp(1, GROUPS),
+            agents,
+            agent_cells: (4 * agents + 64) * model.flocks.len() as u32,
         };
         let walls = Walls::sort(&model.grid, state, fluids + rigid, sizes.cells);
         let all = (fluids + slots) as usize;
@@ -115,10 +120,17 @@ impl Buffers {
             make("rates of density", fluid_or(continuity || mortal(model)) * 16)?,
             make("gradients", fluid_or(model.wants_gradients()) * 16)?,
             make("vorticities", fluid_or(model.wants_gradients()) * 16)?,
-            make("sums of groups", sizes.groups as usize * size_of::<Sums>())?,
+            make("sums of groups", (sizes.groups + agents.div_ceil(128)) as usize * size_of::<Sums>())?,
             make("statistics", (logged + 1) * size_of::<Sums>())?,
             make("births", listed * size_of::<Birth>())?,
             make("forces of hoses", fluid_or(hoses(model).next().is_some()) * 16)?,
+            make("agents", sizes.agents as usize * size_of::<Agent>())?,
+            make("agents before the sort", sizes.agents as usize * size_of::<Agent>())?,
+            make("cells of agents", (sizes.agent_cells as usize + 2) * 4)?,
+            make("counts of cells of agents", (sizes.agent_cells as usize + 2) * 4)?,
+            make("order of agents", sizes.agents as usize * 4)?,
+            make("blocks of cells of agents", ((sizes.agent_cells + 2).div_ceil(BLOCK)) as usize * 4)?,
+            make("flocks", size_of::<Crowd>() + model.flocks.len() * size_of::<Rule>())?,
         ];
         let buffers = Self { all: buffers };
         buffers.fill(gpu, model, state, &walls, &parts, sizes);
@@ -148,6 +160,8 @@ impl Buffers {
         let place = |s: usize| s.checked_sub(b.rigid_slots).map_or(GONE, |k| walls.place[k]);
         write(12, 0, bytemuck::cast_slice(&layout::slots(state, place)));
         write(15, 0, bytemuck::cast_slice(parts));
+        write(25, 0, bytemuck::cast_slice(&layout::agents(model, state)));
+        write(31, 0, &layout::crowd(model, state, sizes));
         if !p.carry.is_empty() {
             write(17, 0, bytemuck::cast_slice(&p.carry[..n]));
         }
@@ -201,6 +215,13 @@ impl Buffers {
             p.gradient[..live].copy_from_slice(&self.fetch(gpu, &self.all[19], 0, live)?);
             let curls: Vec<[f32; 4]> = self.fetch(gpu, &self.all[20], 0, live)?;
             p.vorticity.iter_mut().zip(curls).for_each(|(to, from)| *to = three(from));
+        }
+        if sizes.agents > 0 {
+            let agents: Vec<Agent> = self.fetch(gpu, &self.all[25], 0, sizes.agents as usize)?;
+            let bytes = size_of::<Crowd>() + state.agents.clock.len() * size_of::<Rule>();
+            let crowd: Vec<u32> = self.fetch(gpu, &self.all[31], 0, bytes / 4)?;
+            let rules: &[Rule] = bytemuck::cast_slice(&crowd[size_of::<Crowd>() / 4..]);
+            layout::to_agents(&agents, rules, state);
         }
         let b = &mut state.bodies;
         for (body, from) in b.body.iter_mut().zip(&bodies) {
