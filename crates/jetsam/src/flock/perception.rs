@@ -113,6 +113,15 @@ impl Tile {
         [&l[0][b].0, &l[1][b].0, &l[2][b].0, &l[3][b].0, &l[4][b].0, &l[5][b].0]
     }
 
+    /// Up to `n` vectors from number `first` on.
+    #[inline(always)]
+    pub fn vectors(&self, first: usize, n: usize) -> impl Iterator<Item = [&[f32; LANES]; 6]> {
+        let end = self.blocks().min(first + n);
+        let [x, y, z, u, v, w] = self.lines.each_ref().map(|line| line[first..end].iter());
+        let places = x.zip(y).zip(z);
+        places.zip(u.zip(v).zip(w)).map(|(((x, y), z), ((u, v), w))| [&x.0, &y.0, &z.0, &u.0, &v.0, &w.0])
+    }
+
     #[inline(always)]
     fn begin(&mut self) {
         self.len = 0;
