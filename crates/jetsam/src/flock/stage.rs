@@ -140,7 +140,7 @@ impl Crowd {
         let view = View {
             world,
             grid,
-            width: narrowest(grid),
+            width: sides(grid),
             cells: &self.cells,
             sorted: &self.sorted,
             records: &agents.record,
@@ -178,10 +178,10 @@ impl Crowd {
     }
 }
 
-/// The smallest side of a cell (m).
-fn narrowest(grid: &Grid) -> f32 {
+/// Sides of a cell (m), infinite where there is one layer.
+fn sides(grid: &Grid) -> [f32; 3] {
     // a rounding error may put an agent into the next cell
-    grid.inverse.iter().filter(|i| **i > 0.0).map(|i| 0.99995 / i).fold(f32::INFINITY, f32::min)
+    grid.inverse.map(|i| 0.99995 / i)
 }
 
 /// Brings the agents `range` of an array into a new order; an array that is not used stays so.

@@ -141,10 +141,11 @@ fn reynolds_of<S: Simd, const ALIKE: bool, const ALL_AROUND: bool>(
     let align_sq = square(rule.alignment_radius, unbounded);
     let draw_sq = square(rule.cohesion_radius, unbounded);
     let bound = rule.view.unwrap_or(-1.0);
-    for first in (0..tile.blocks()).step_by(u64::BITS as usize) {
+    let window = tile.window();
+    for first in window.clone().step_by(u64::BITS as usize) {
         // where anybody is near, a bit a vector: a branch for each would be foretold badly
         let mut near = 0u64;
-        for (b, block) in tile.vectors(first, u64::BITS as usize).enumerate() {
+        for (b, block) in tile.vectors(first..window.end.min(first + u64::BITS as usize)).enumerate() {
             let (d, r_sq) = apart(simd, me, &block);
             let (mut aligned, mut drawn) = ([0.0; LANES], [0.0; LANES]);
             for l in 0..LANES {
@@ -209,8 +210,7 @@ fn couzin<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unb
     let near_sq = rule.separation_radius * rule.separation_radius;
     let align_sq = square(rule.alignment_radius, false).max(near_sq);
     let draw_sq = square(rule.cohesion_radius, unbounded).max(align_sq);
-    for b in 0..tile.blocks() {
-        let block = tile.block(b);
+    for block in tile.vectors(tile.window()) {
         let (d, r_sq) = apart(simd, me, &block);
         let seen = match rule.view {
             Some(bound) => in_view(me, &d, &r_sq, bound),
@@ -233,8 +233,7 @@ fn couzin<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unb
 #[inline(always)]
 fn vicsek<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
     let align_sq = square(rule.alignment_radius, unbounded);
-    for b in 0..tile.blocks() {
-        let block = tile.block(b);
+    for block in tile.vectors(tile.window()) {
         let (d, r_sq) = apart(simd, me, &block);
         let mut aligned = [0.0; LANES];
         for l in 0..LANES {
@@ -255,8 +254,7 @@ fn vicsek<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unb
 pub fn seen<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile) -> Vec3 {
     let mut total = [[0.0; LANES]; 3];
     let sight_sq = rule.sight * rule.sight;
-    for b in 0..tile.blocks() {
-        let block = tile.block(b);
+    for block in tile.vectors(tile.window()) {
         let (d, r_sq) = apart(simd, me, &block);
         let mut weight = match rule.view {
             Some(bound) => in_view(me, &d, &r_sq, bound),
