@@ -37,7 +37,7 @@ pub struct View<'a> {
     pub records: &'a [Record],
     /// Their ids.
     pub id: &'a [u32],
-    /// The first agent of each flock.
+    /// The first agent of each flock, if any follows one.
     pub leaders: &'a [Record],
     /// Time of each flock.
     pub clock: &'a [Clock],

@@ -18,22 +18,7 @@ const FAR: f32 = 1e18;
 
 /// Cells for agents: periodic axes as the domain's, the others about the agents, wherever they are; at least `width` wide (m).
 pub fn grid_about(domain: &Grid, records: &[Record], dimensions: u32, width: f64) -> Grid {
-    let (low, high) = records
-        .par_chunks(CHUNK)
-        .map(|chunk| {
-            let mut b = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-            for r in chunk.iter().filter(|r| r.x.iter().all(|c| c.is_finite())) {
-                for a in 0..3 {
-                    b.0[a] = b.0[a].min(r.x[a]);
-                    b.1[a] = b.1[a].max(r.x[a]);
-                }
-            }
-            b
-        })
-        .reduce(
-            || ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]),
-            |a, b| (std::array::from_fn(|k| a.0[k].min(b.0[k])), std::array::from_fn(|k| a.1[k].max(b.1[k]))),
-        );
+    let (low, high) = if domain.period.iter().all(|p| *p > 0.0) { ([0.0; 3], [0.0; 3]) } else { ends(records) };
     let mut grid = domain.clone();
     let length: [f64; 3] = std::array::from_fn(|a| match grid.period[a] {
         p if p > 0.0 => f64::from(p),
@@ -62,6 +47,26 @@ pub fn grid_about(domain: &Grid, records: &[Record], dimensions: u32, width: f64
         }
     }
     grid
+}
+
+/// The corners of the box that agents are in (m).
+fn ends(records: &[Record]) -> ([f32; 3], [f32; 3]) {
+    records
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            let mut b = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+            for r in chunk.iter().filter(|r| r.x.iter().all(|c| c.is_finite())) {
+                for a in 0..3 {
+                    b.0[a] = b.0[a].min(r.x[a]);
+                    b.1[a] = b.1[a].max(r.x[a]);
+                }
+            }
+            b
+        })
+        .reduce(
+            || ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]),
+            |a, b| (std::array::from_fn(|k| a.0[k].min(b.0[k])), std::array::from_fn(|k| a.1[k].max(b.1[k]))),
+        )
 }
 
 /// Positions and velocities of all agents in sorted order, each component by itself, and room for a vector at the end.

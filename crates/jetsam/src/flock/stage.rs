@@ -135,7 +135,8 @@ impl Crowd {
     /// Decides for the flocks that are due.
     fn decide(&mut self, level: Level, world: &World, agents: &mut Agents, due: &[bool]) {
         let flocks = &world.model.flocks;
-        let leaders: Vec<Record> = flocks.iter().map(|f| first(f, agents)).collect();
+        let led = flocks.iter().any(|f| f.leader.is_some());
+        let leaders: Vec<Record> = flocks.iter().filter(|_| led).map(|f| first(f, agents)).collect();
         let Some(grid) = &self.grid else { return };
         let view = View {
             world,
