@@ -6,7 +6,7 @@ use super::model::FlockConstants;
 use super::motion::turn;
 use super::nearest::{Among, Near, nearest};
 use super::obstacles;
-use super::perception::{Sorted, Tile};
+use super::perception::{Sorted, Source, Tile};
 use super::stage::World;
 use super::sums::{self, Sums};
 use crate::interact::cells::{Cells, Grid};
@@ -27,8 +27,8 @@ pub struct View<'a> {
     pub world: &'a World<'a>,
     /// Cells of agents.
     pub grid: &'a Grid,
-    /// Width of a cell, the smallest of its sides (m).
-    pub width: f32,
+    /// Sides of a cell (m), infinite where there is one layer.
+    pub width: [f32; 3],
     /// Where they begin, flock by flock.
     pub cells: &'a [Cells],
     /// All agents.
@@ -37,7 +37,7 @@ pub struct View<'a> {
     pub records: &'a [Record],
     /// Their ids.
     pub id: &'a [u32],
-    /// The first agent of each flock.
+    /// The first agent of each flock, if any follows one.
     pub leaders: &'a [Record],
     /// Time of each flock.
     pub clock: &'a [Clock],
@@ -48,6 +48,7 @@ pub struct View<'a> {
 pub struct Scratch {
     tiles: Vec<Tile>,
     nearest: Vec<Near>,
+    sums: Vec<Sums>,
 }
 
 thread_local! {
@@ -79,26 +80,58 @@ pub fn chunk<S: Simd>(
     let flocks = &view.world.model.flocks;
     let rule = &flocks[own];
     scratch.tiles.resize_with(flocks.len().max(scratch.tiles.len()), Tile::default);
-    let mut from = members.start;
-    while from < members.end {
-        let cell = view.grid.coordinates(view.records[from].x);
-        let mut to = from + 1;
-        while to < members.end && view.grid.coordinates(view.records[to].x) == cell {
-            to += 1;
+    scratch.sums.clear();
+    let mut row = members.start;
+    while row < members.end {
+        let begin = cell_of(view, row);
+        let cells = view.cells[own].row(begin[0], view.grid.cells[0] - 1, begin[1], begin[2]);
+        let row_end = members.end.min(rule.first + cells.end);
+        let last = cell_of(view, row_end - 1)[0];
+        for j in (0..flocks.len()).filter(|&j| looks_at(rule, j)) {
+            let source = Source { grid: view.grid, cells: &view.cells[j], first: flocks[j].first, sorted: view.sorted };
+            scratch.tiles[j].pack(simd, source, begin, last, far(view, rule, j));
         }
-        for (j, other) in flocks.iter().enumerate() {
-            let metric = rule.neighbours == 0 || rule.relations[j] != Relation::School;
-            if rule.relations[j] != Relation::Ignore && metric {
-                let far = (rule.reach(j) / view.width).ceil() as i32;
-                scratch.tiles[j].pack(simd, view.grid, &view.cells[j], other.first, view.sorted, cell, far);
+        while row < row_end {
+            let cell = cell_of(view, row);
+            for j in (0..flocks.len()).filter(|&j| looks_at(rule, j)) {
+                let slab = (cell[0] - begin[0]) as usize;
+                scratch.tiles[j].look(slab..slab + 2 * far(view, rule, j)[0] as usize + 1);
             }
+            let cell_end = row_end.min(rule.first + view.cells[own].end(cell));
+            for i in row..cell_end {
+                let sums = perceive(simd, scratch, view, own, i);
+                scratch.sums.push(sums);
+            }
+            row = cell_end;
         }
-        for i in from..to {
-            let sums = perceive(simd, scratch, view, own, i);
-            next[i - members.start] = decide(view, own, i, &sums).to_array();
-        }
-        from = to;
     }
+    // by itself: decisions of several agents overlap in the processor
+    for ((i, sums), next) in members.zip(&scratch.sums).zip(next) {
+        *next = decide(view, own, i, sums).to_array();
+    }
+}
+
+/// The cell of agent `i`.
+#[inline(always)]
+fn cell_of(view: View, i: usize) -> [i32; 3] {
+    view.grid.coordinates(view.records[i].x)
+}
+
+/// Whether agents look for those of flock `other` within a radius.
+#[inline(always)]
+fn looks_at(rule: &FlockConstants, other: usize) -> bool {
+    match rule.relations[other] {
+        Relation::School => rule.neighbours == 0,
+        Relation::Flee | Relation::Chase => true,
+        Relation::Ignore => false,
+    }
+}
+
+/// How many cells away those of flock `other` can be that matter.
+#[inline(always)]
+fn far(view: View, rule: &FlockConstants, other: usize) -> [i32; 3] {
+    let (reach, [x, y, z]) = (rule.reach(other), view.width);
+    [(reach / x).ceil() as i32, (reach / y).ceil() as i32, (reach / z).ceil() as i32]
 }
 
 /// Sums over all that agent `i` of flock `own` perceives.

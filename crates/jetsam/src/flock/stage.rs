@@ -135,12 +135,13 @@ impl Crowd {
     /// Decides for the flocks that are due.
     fn decide(&mut self, level: Level, world: &World, agents: &mut Agents, due: &[bool]) {
         let flocks = &world.model.flocks;
-        let leaders: Vec<Record> = flocks.iter().map(|f| first(f, agents)).collect();
+        let led = flocks.iter().any(|f| f.leader.is_some());
+        let leaders: Vec<Record> = flocks.iter().filter(|_| led).map(|f| first(f, agents)).collect();
         let Some(grid) = &self.grid else { return };
         let view = View {
             world,
             grid,
-            width: narrowest(grid),
+            width: sides(grid),
             cells: &self.cells,
             sorted: &self.sorted,
             records: &agents.record,
@@ -178,10 +179,10 @@ impl Crowd {
     }
 }
 
-/// The smallest side of a cell (m).
-fn narrowest(grid: &Grid) -> f32 {
+/// Sides of a cell (m), infinite where there is one layer.
+fn sides(grid: &Grid) -> [f32; 3] {
     // a rounding error may put an agent into the next cell
-    grid.inverse.iter().filter(|i| **i > 0.0).map(|i| 0.99995 / i).fold(f32::INFINITY, f32::min)
+    grid.inverse.map(|i| 0.99995 / i)
 }
 
 /// Brings the agents `range` of an array into a new order; an array that is not used stays so.

@@ -4,7 +4,7 @@
 
 use super::model::FlockConstants;
 use super::perception::Tile;
-use crate::interact::lanes::{LANES, Lanes, sum};
+use crate::interact::lanes::{LANES, Lanes, minus, squares, sum};
 use crate::laws::flock;
 use crate::scene::FlockModel;
 use crate::state::Record;
@@ -64,14 +64,9 @@ fn fold<S: Simd>(simd: S, wide: &[Lanes; 3]) -> Vec3 {
 
 /// `d` and its square for sixteen candidates.
 #[inline(always)]
-fn apart(me: &Record, block: &[&[f32; LANES]; 6]) -> ([Lanes; 3], Lanes) {
-    let (mut d, mut r_sq) = ([[0.0; LANES]; 3], [0.0; LANES]);
-    for l in 0..LANES {
-        d[0][l] = block[0][l] - me.x[0];
-        d[1][l] = block[1][l] - me.x[1];
-        d[2][l] = block[2][l] - me.x[2];
-        r_sq[l] = d[0][l] * d[0][l] + d[1][l] * d[1][l] + d[2][l] * d[2][l];
-    }
+fn apart<S: Simd>(simd: S, me: &Record, block: &[&Lanes; 6]) -> ([Lanes; 3], Lanes) {
+    let d = [minus(simd, block[0], me.x[0]), minus(simd, block[1], me.x[1]), minus(simd, block[2], me.x[2])];
+    let r_sq = squares(simd, &d);
     (d, r_sq)
 }
 
@@ -103,8 +98,8 @@ pub fn school<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile,
     let mut wide = Wide::new();
     match rule.model {
         FlockModel::Reynolds => reynolds(simd, me, rule, tile, unbounded, &mut wide),
-        FlockModel::Couzin => couzin(me, rule, tile, unbounded, &mut wide),
-        FlockModel::Vicsek => vicsek(me, rule, tile, unbounded, &mut wide),
+        FlockModel::Couzin => couzin(simd, me, rule, tile, unbounded, &mut wide),
+        FlockModel::Vicsek => vicsek(simd, me, rule, tile, unbounded, &mut wide),
     }
     sums.repelled += fold(simd, &wide.repelled);
     sums.velocity += fold(simd, &wide.velocity);
@@ -119,67 +114,104 @@ fn square(radius: f32, unbounded: bool) -> f32 {
     if unbounded { 1e30 } else { radius * radius }
 }
 
-/// E22.
+/// E22. Compiled for each combination of what most flocks are spared: a second radius, and a field of view.
 #[inline(always)]
 fn reynolds<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+    let alike = unbounded || rule.alignment_radius == rule.cohesion_radius;
+    match (alike, rule.view) {
+        (true, None) => reynolds_of::<S, true, true>(simd, me, rule, tile, unbounded, wide),
+        (true, Some(_)) => reynolds_of::<S, true, false>(simd, me, rule, tile, unbounded, wide),
+        (false, None) => reynolds_of::<S, false, true>(simd, me, rule, tile, unbounded, wide),
+        (false, Some(_)) => reynolds_of::<S, false, false>(simd, me, rule, tile, unbounded, wide),
+    }
+}
+
+/// `ALIKE`: the radii of alignment and cohesion are the same. `ALL_AROUND`: the agent sees all around.
+#[inline(always)]
+fn reynolds_of<S: Simd, const ALIKE: bool, const ALL_AROUND: bool>(
+    simd: S,
+    me: &Record,
+    rule: &FlockConstants,
+    tile: &Tile,
+    unbounded: bool,
+    wide: &mut Wide,
+) {
     let near_sq = rule.separation_radius * rule.separation_radius;
     let near_limit = f32x16::splat(simd, near_sq);
     let align_sq = square(rule.alignment_radius, unbounded);
     let draw_sq = square(rule.cohesion_radius, unbounded);
-    let far_limit = f32x16::splat(simd, near_sq.max(align_sq).max(draw_sq));
-    for b in 0..tile.blocks() {
-        let block = tile.block(b);
-        let (d, r_sq) = apart(me, &block);
-        let distances = f32x16::load_array_ref(simd, &r_sq);
-        // one vector in four has nobody in reach
-        if !distances.simd_lt(far_limit).any_true() {
-            continue;
-        }
-        let mut aligned = [0.0; LANES];
-        for l in 0..LANES {
-            aligned[l] = flock::within(r_sq[l], align_sq);
-        }
-        let mut drawn = aligned;
-        if align_sq != draw_sq {
+    let bound = rule.view.unwrap_or(-1.0);
+    let window = tile.window();
+    for first in window.clone().step_by(u64::BITS as usize) {
+        // where anybody is near, a bit a vector: a branch for each would be foretold badly
+        let mut near = 0u64;
+        for (b, block) in tile.vectors(first..window.end.min(first + u64::BITS as usize)).enumerate() {
+            let (d, r_sq) = apart(simd, me, &block);
+            let (mut aligned, mut drawn) = ([0.0; LANES], [0.0; LANES]);
             for l in 0..LANES {
-                drawn[l] = flock::within(r_sq[l], draw_sq);
+                aligned[l] = flock::within(r_sq[l], align_sq);
+                drawn[l] = if ALIKE { aligned[l] } else { flock::within(r_sq[l], draw_sq) };
             }
-        }
-        let mut seen = [1.0; LANES];
-        if let Some(bound) = rule.view {
-            seen = in_view(me, &d, &r_sq, bound);
+            if !ALL_AROUND {
+                let seen = in_view(me, &d, &r_sq, bound);
+                for l in 0..LANES {
+                    aligned[l] *= seen[l];
+                    drawn[l] *= seen[l];
+                }
+            }
+            add(&mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
+            add(&mut wide.place, &drawn, [&d[0], &d[1], &d[2]]);
             for l in 0..LANES {
-                aligned[l] *= seen[l];
-                drawn[l] *= seen[l];
+                wide.aligned[l] += aligned[l];
+                if !ALIKE {
+                    wide.drawn[l] += drawn[l];
+                }
             }
+            near |= u64::from(f32x16::load_array_ref(simd, &r_sq).simd_lt(near_limit).any_true()) << b;
         }
-        add(&mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
-        add(&mut wide.place, &drawn, [&d[0], &d[1], &d[2]]);
-        for l in 0..LANES {
-            wide.aligned[l] += aligned[l];
-            wide.drawn[l] += drawn[l];
+        while near != 0 {
+            let block = tile.block(first + near.trailing_zeros() as usize);
+            near &= near - 1;
+            separate::<S, ALL_AROUND>(simd, me, rule, &block, near_sq, wide);
         }
-        // few are near: most vectors are spared the division
-        if distances.simd_lt(near_limit).any_true() {
-            let mut push = [0.0; LANES];
-            for l in 0..LANES {
-                let weight = flock::separation(r_sq[l], rule.separation_radius) * flock::within(r_sq[l], near_sq);
-                push[l] = -seen[l] * weight;
-            }
-            add(&mut wide.repelled, &push, [&d[0], &d[1], &d[2]]);
-        }
+    }
+    if ALIKE {
+        wide.drawn = wide.aligned;
+    }
+}
+
+/// Pushes away from those of sixteen that are near.
+#[inline(always)]
+fn separate<S: Simd, const ALL_AROUND: bool>(
+    simd: S,
+    me: &Record,
+    rule: &FlockConstants,
+    block: &[&Lanes; 6],
+    near_sq: f32,
+    wide: &mut Wide,
+) {
+    let (d, r_sq) = apart(simd, me, block);
+    let seen = match ALL_AROUND {
+        true => [1.0; LANES],
+        false => in_view(me, &d, &r_sq, rule.view.unwrap_or(-1.0)),
+    };
+    for l in 0..LANES {
+        let weight = flock::separation(r_sq[l], rule.separation_radius) * flock::within(r_sq[l], near_sq);
+        let push = -seen[l] * weight;
+        wide.repelled[0][l] += push * d[0][l];
+        wide.repelled[1][l] += push * d[1][l];
+        wide.repelled[2][l] += push * d[2][l];
     }
 }
 
 /// E23. Speeds are equal: velocities stand for directions.
 #[inline(always)]
-fn couzin(me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+fn couzin<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
     let near_sq = rule.separation_radius * rule.separation_radius;
     let align_sq = square(rule.alignment_radius, false).max(near_sq);
     let draw_sq = square(rule.cohesion_radius, unbounded).max(align_sq);
-    for b in 0..tile.blocks() {
-        let block = tile.block(b);
-        let (d, r_sq) = apart(me, &block);
+    for block in tile.vectors(tile.window()) {
+        let (d, r_sq) = apart(simd, me, &block);
         let seen = match rule.view {
             Some(bound) => in_view(me, &d, &r_sq, bound),
             None => [1.0; LANES],
@@ -199,11 +231,10 @@ fn couzin(me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide
 
 /// E24.
 #[inline(always)]
-fn vicsek(me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+fn vicsek<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
     let align_sq = square(rule.alignment_radius, unbounded);
-    for b in 0..tile.blocks() {
-        let block = tile.block(b);
-        let (d, r_sq) = apart(me, &block);
+    for block in tile.vectors(tile.window()) {
+        let (d, r_sq) = apart(simd, me, &block);
         let mut aligned = [0.0; LANES];
         for l in 0..LANES {
             aligned[l] = flock::within(r_sq[l], align_sq);
@@ -223,9 +254,8 @@ fn vicsek(me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide
 pub fn seen<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile) -> Vec3 {
     let mut total = [[0.0; LANES]; 3];
     let sight_sq = rule.sight * rule.sight;
-    for b in 0..tile.blocks() {
-        let block = tile.block(b);
-        let (d, r_sq) = apart(me, &block);
+    for block in tile.vectors(tile.window()) {
+        let (d, r_sq) = apart(simd, me, &block);
         let mut weight = match rule.view {
             Some(bound) => in_view(me, &d, &r_sq, bound),
             None => [1.0; LANES],
