@@ -3,6 +3,7 @@
 use clap::{ArgGroup, Parser, Subcommand, ValueEnum};
 use jetsam::Scene;
 use jetsam::voxelize::Rule;
+use jetsam_view::style;
 use std::path::PathBuf;
 
 /// Meshes dropped into water: a particle simulator of rigid bodies and fluids.
@@ -107,6 +108,80 @@ pub struct Run {
     /// Seed of everything random in the scene.
     #[arg(long)]
     pub seed: Option<u32>,
+    #[command(flatten)]
+    pub pictures: PictureArgs,
+}
+
+/// Who draws pictures.
+#[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum Renderer {
+    /// A graphics processor where there is one, or where only it can draw what is asked for.
+    #[default]
+    Auto,
+    /// A graphics processor, if only a software one.
+    Gpu,
+    /// The processor.
+    Cpu,
+}
+
+/// How pictures look.
+#[derive(clap::Args, Clone)]
+#[command(next_help_heading = "Pictures")]
+pub struct PictureArgs {
+    /// Who draws.
+    #[arg(long, value_enum, default_value_t)]
+    pub renderer: Renderer,
+    /// Width and height in pixels.
+    #[arg(long, value_parser = size, default_value = "1280x720", value_name = "WIDTHxHEIGHT")]
+    pub size: [usize; 2],
+    /// How fluids are drawn.
+    #[arg(long, value_parser = one_of(&style::Fluid::ALL), default_value = "balls", value_name = "balls|points|surface|hidden")]
+    pub fluid: style::Fluid,
+    /// How the surface of a fluid is smoothed.
+    #[arg(long, value_parser = one_of(&style::Smoothing::ALL), default_value = "narrow-range", value_name = "narrow-range|bilateral|curvature-flow|none")]
+    pub smoothing: style::Smoothing,
+    /// Draw bodies as their particles.
+    #[arg(long)]
+    pub body_particles: bool,
+    /// What colours show.
+    #[arg(long, value_parser = color_by, default_value = "speed", value_name = "speed|density|pressure|kind|owner")]
+    pub color: style::ColorBy,
+    /// The scale of colours.
+    #[arg(long, value_parser = map, default_value = "water", value_name = "water|viridis|magma|balance")]
+    pub map: jetsam_view::color::Map,
+    /// Ends of the scale of colours, in the unit of what is shown.
+    #[arg(long, value_parser = numbers::<2>, value_name = "LOW,HIGH", allow_hyphen_values = true)]
+    pub range: Option<[f64; 2]>,
+    /// Draw the scale of colours into the picture.
+    #[arg(long)]
+    pub legend: bool,
+    /// Draw velocities as arrows, as long as a particle moves in this many seconds.
+    #[arg(long, value_parser = not_negative, default_value = "0", value_name = "SECONDS")]
+    pub arrows: f64,
+    /// Two pictures side by side, one for each eye.
+    #[arg(long)]
+    pub stereo: bool,
+    /// Samples of a pixel along each side.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=4))]
+    pub samples: u32,
+}
+
+impl PictureArgs {
+    /// The choices for the GPU's renderer.
+    pub fn style(&self) -> style::Style {
+        style::Style {
+            fluid: self.fluid,
+            smoothing: self.smoothing,
+            bodies: if self.body_particles { style::Bodies::Particles } else { style::Bodies::Meshes },
+            color: self.color,
+            map: self.map,
+            range: self.range.map(|r| r.map(|x| x as f32)),
+            arrows: self.arrows as f32,
+            stereo: if self.stereo { 1.0 } else { 0.0 },
+            samples: self.samples,
+            ..style::Style::default()
+        }
+    }
 }
 
 impl Run {
@@ -127,6 +202,8 @@ pub enum Save {
     Png,
     /// A video of the pictures (needs ffmpeg).
     Mp4,
+    /// The pictures as an animated PNG, which browsers play (needs nothing).
+    Apng,
     /// The particles of a frame, binary PLY.
     Ply,
     /// The particles of a frame, legacy VTK.
@@ -298,6 +375,36 @@ pub struct Scenes {
 fn not_negative(text: &str) -> Result<f64, String> {
     let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if number >= 0.0 && number.is_finite() { Ok(number) } else { Err("must be finite and not negative".into()) }
+}
+
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let parts = text.split_once('x').ok_or("write WIDTHxHEIGHT, e.g. 1920x1080")?;
+    let side = |part: &str| match part.parse::<usize>() {
+        Ok(n) if (16..=8192).contains(&n) && n % 2 == 0 => Ok(n),
+        _ => Err(format!("{part} is not an even number from 16 to 8192")),
+    };
+    Ok([side(parts.0)?, side(parts.1)?])
+}
+
+/// Reads a choice by its name, written with hyphens.
+fn one_of<T: Copy + Send + Sync>(
+    all: &'static [(T, &'static str)],
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync {
+    move |text| {
+        let found = all.iter().find(|(_, name)| name.replace(' ', "-") == text);
+        let names = || all.iter().map(|(_, name)| name.replace(' ', "-")).collect::<Vec<_>>().join(", ");
+        found.map(|(choice, _)| *choice).ok_or_else(|| format!("choose one of {}", names()))
+    }
+}
+
+fn color_by(text: &str) -> Result<style::ColorBy, String> {
+    let found = style::ColorBy::ALL.iter().find(|(_, name, _)| *name == text);
+    found.map(|(choice, ..)| *choice).ok_or_else(|| "choose speed, density, pressure, kind or owner".into())
+}
+
+fn map(text: &str) -> Result<jetsam_view::color::Map, String> {
+    let found = jetsam_view::color::Map::ALL.into_iter().find(|m| m.name() == text);
+    found.ok_or_else(|| "choose water, viridis, magma or balance".into())
 }
 
 fn rule(text: &str) -> Result<Rule, String> {

@@ -1,0 +1,65 @@
+//! What a picture shows of a world at one moment: plain copies, so that the world may run on.
+
+use glam::{DQuat, DVec3};
+use jetsam::World;
+use jetsam::state::{Kind, Record};
+
+/// A moment of a world. Particle arrays are indexed alike, kind by kind, without gaps, in the layout that the GPU reads.
+#[derive(Clone, Debug, Default)]
+pub struct Frame {
+    /// Simulated time (s).
+    pub time: f64,
+    /// Place, volume, velocity and pressure share of each living particle.
+    pub record: Vec<Record>,
+    /// Acceleration (m/s^2; of bodies' particles the force, N) and, last, relative density (1 for bodies).
+    pub push: Vec<[f32; 4]>,
+    /// Identity, and index of the fluid or body.
+    pub tag: Vec<[u32; 2]>,
+    /// First particle of each kind.
+    pub first: [u32; Kind::COUNT],
+    /// Particles of each kind.
+    pub count: [u32; Kind::COUNT],
+    /// Centre of mass (m) and orientation of each body.
+    pub poses: Vec<(DVec3, DQuat)>,
+    /// Agents, flock by flock.
+    pub agents: Vec<Record>,
+}
+
+impl Frame {
+    /// The present moment of a world.
+    pub fn of(world: &World) -> Self {
+        let mut frame = Self::default();
+        frame.take(world);
+        frame
+    }
+
+    /// The same, in the memory of an earlier moment.
+    pub fn take(&mut self, world: &World) {
+        let state = world.state();
+        let p = &state.particles;
+        self.time = world.time();
+        self.record.clear();
+        self.push.clear();
+        self.tag.clear();
+        for kind in Kind::ALL {
+            let range = p.segment(kind);
+            self.first[kind as usize] = self.record.len() as u32;
+            self.count[kind as usize] = range.len() as u32;
+            self.record.extend_from_slice(&p.record[range.clone()]);
+            self.push.extend(range.clone().map(|i| {
+                let [x, y, z] = p.push[i];
+                [x, y, z, if kind == Kind::Fluid { p.density[i] } else { 1.0 }]
+            }));
+            self.tag.extend(range.map(|i| [p.id[i], p.owner[i]]));
+        }
+        self.poses.clear();
+        self.poses.extend(state.bodies.body.iter().map(|b| (b.x, b.q)));
+        self.agents.clone_from(&state.agents.record);
+    }
+
+    /// Range of a kind in the particle arrays.
+    pub fn segment(&self, kind: Kind) -> std::ops::Range<usize> {
+        let first = self.first[kind as usize] as usize;
+        first..first + self.count[kind as usize] as usize
+    }
+}
