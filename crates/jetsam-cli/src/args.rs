@@ -8,7 +8,8 @@ use std::path::PathBuf;
 
 /// Meshes dropped into water: a particle simulator of rigid bodies and fluids.
 ///
-/// Without a command, runs the scene `monkey-splash` and writes pictures and numbers to out/monkey-splash/.
+/// Without a command, opens the scene `monkey-splash` in a window; where there is no display, runs it and writes pictures and numbers
+/// to out/monkey-splash/.
 #[derive(Parser)]
 #[command(name = "jetsam", version, max_term_width = 100)]
 pub struct Args {
@@ -20,6 +21,8 @@ pub struct Args {
 pub enum Command {
     /// Simulate a scene; write pictures and numbers.
     Run(Run),
+    /// Open a scene in a window, and put a hand in it.
+    View(View),
     /// Read a scene and say what it amounts to: particles, time step, stability margins, warnings.
     Check(Check),
     /// Turn a mesh into particles and say how well they fill it.
@@ -112,6 +115,20 @@ pub struct Run {
     pub pictures: PictureArgs,
 }
 
+#[derive(clap::Args, Clone)]
+pub struct View {
+    #[command(flatten)]
+    pub input: Input,
+    /// Wait for the space bar.
+    #[arg(long)]
+    pub paused: bool,
+    /// Threads to compute with; by default one a core.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    #[command(flatten)]
+    pub style: StyleArgs,
+}
+
 /// Who draws pictures.
 #[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum Renderer {
@@ -134,6 +151,17 @@ pub struct PictureArgs {
     /// Width and height in pixels.
     #[arg(long, value_parser = size, default_value = "1280x720", value_name = "WIDTHxHEIGHT")]
     pub size: [usize; 2],
+    /// Draw the scale of colours into the picture.
+    #[arg(long)]
+    pub legend: bool,
+    #[command(flatten)]
+    pub style: StyleArgs,
+}
+
+/// How a world looks.
+#[derive(clap::Args, Clone)]
+#[command(next_help_heading = "Looks")]
+pub struct StyleArgs {
     /// How fluids are drawn.
     #[arg(long, value_parser = one_of(&style::Fluid::ALL), default_value = "balls", value_name = "balls|points|surface|hidden")]
     pub fluid: style::Fluid,
@@ -152,12 +180,12 @@ pub struct PictureArgs {
     /// Ends of the scale of colours, in the unit of what is shown.
     #[arg(long, value_parser = numbers::<2>, value_name = "LOW,HIGH", allow_hyphen_values = true)]
     pub range: Option<[f64; 2]>,
-    /// Draw the scale of colours into the picture.
-    #[arg(long)]
-    pub legend: bool,
-    /// Draw velocities as arrows, as long as a particle moves in this many seconds.
+    /// Draw arrows, as long as the way of a particle in this many seconds.
     #[arg(long, value_parser = not_negative, default_value = "0", value_name = "SECONDS")]
     pub arrows: f64,
+    /// What arrows show: the velocity, or the force over the mass.
+    #[arg(long, value_parser = one_of(&style::Arrows::ALL), default_value = "velocity", value_name = "velocity|force")]
+    pub arrows_of: style::Arrows,
     /// Two pictures side by side, one for each eye.
     #[arg(long)]
     pub stereo: bool,
@@ -166,7 +194,7 @@ pub struct PictureArgs {
     pub samples: u32,
 }
 
-impl PictureArgs {
+impl StyleArgs {
     /// The choices for the GPU's renderer.
     pub fn style(&self) -> style::Style {
         style::Style {
@@ -177,6 +205,7 @@ impl PictureArgs {
             map: self.map,
             range: self.range.map(|r| r.map(|x| x as f32)),
             arrows: self.arrows as f32,
+            arrows_of: self.arrows_of,
             stereo: if self.stereo { 1.0 } else { 0.0 },
             samples: self.samples,
             ..style::Style::default()
@@ -184,14 +213,12 @@ impl PictureArgs {
     }
 }
 
-impl Run {
+impl Command {
     /// What plain `jetsam` does.
-    pub fn default_scene() -> Self {
+    pub fn default_scene(display: bool) -> Self {
         let name = jetsam::scene::builtin::SCENES[0].name;
-        match Args::parse_from(["jetsam", "run", name]).command {
-            Some(Command::Run(run)) => run,
-            _ => unreachable!("`run` parses to Run"),
-        }
+        let command = if display { "view" } else { "run" };
+        Args::parse_from(["jetsam", command, name]).command.expect("a command was given")
     }
 }
 

@@ -11,7 +11,7 @@ pub struct Frame {
     pub time: f64,
     /// Place, volume, velocity and pressure share of each living particle.
     pub record: Vec<Record>,
-    /// Acceleration (m/s^2; of bodies' particles the force, N) and, last, relative density (1 for bodies).
+    /// Acceleration (m/s^2): force on the particle over its mass; and, last, relative density (1 for bodies).
     pub push: Vec<[f32; 4]>,
     /// Identity, and index of the fluid or body.
     pub tag: Vec<[u32; 2]>,
@@ -46,9 +46,17 @@ impl Frame {
             self.first[kind as usize] = self.record.len() as u32;
             self.count[kind as usize] = range.len() as u32;
             self.record.extend_from_slice(&p.record[range.clone()]);
+            let bodies = &state.bodies.body;
             self.push.extend(range.clone().map(|i| {
-                let [x, y, z] = p.push[i];
-                [x, y, z, if kind == Kind::Fluid { p.density[i] } else { 1.0 }]
+                if kind == Kind::Fluid {
+                    let [x, y, z] = p.push[i];
+                    return [x, y, z, p.density[i]];
+                }
+                // force over the particle's part of the body's mass
+                let body = &bodies[p.owner[i] as usize];
+                let share = (body.slots.len() as f64 / body.mass) as f32;
+                let [x, y, z] = p.push[i].map(|f| share * f);
+                [x, y, z, 1.0]
             }));
             self.tag.extend(range.map(|i| [p.id[i], p.owner[i]]));
         }

@@ -27,6 +27,8 @@ mod raster;
 pub mod show;
 mod splat;
 pub mod style;
+#[cfg(feature = "window")]
+pub mod window;
 
 pub use apng::Animation;
 pub use camera::Camera;

@@ -89,6 +89,21 @@ impl Smoothing {
     ];
 }
 
+/// What arrows show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Arrows {
+    /// Velocity: the way at this velocity.
+    #[default]
+    Velocity,
+    /// Acceleration, the force on a particle over its mass: the way from rest.
+    Force,
+}
+
+impl Arrows {
+    /// All of them, with their names.
+    pub const ALL: [(Arrows, &str); 2] = [(Arrows::Velocity, "velocity"), (Arrows::Force, "force")];
+}
+
 /// All choices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Style {
@@ -110,8 +125,10 @@ pub struct Style {
     pub radius: Option<f32>,
     /// Water swallows a beam's red to 1/e in `1 / clarity` of a typical depth: 0 is glass.
     pub murk: f32,
-    /// Velocity arrows: how far their particle moves in this time (s) is their length; 0 for none.
+    /// Arrows: as long as the way of their particle in this time (s); 0 for none.
     pub arrows: f32,
+    /// What they show.
+    pub arrows_of: Arrows,
     /// Every so many particles has an arrow.
     pub arrow_every: u32,
     /// Lines where particles were.
@@ -124,6 +141,8 @@ pub struct Style {
     pub edges: bool,
     /// Samples of a pixel along each side.
     pub samples: u32,
+    /// Pixels of a sample along each side: more than one for a quick, coarse picture.
+    pub coarse: u32,
     /// Distance of the eyes in the picture's depth, for two pictures side by side; 0 for one picture.
     pub stereo: f32,
 }
@@ -141,12 +160,14 @@ impl Default for Style {
             radius: None,
             murk: 1.0,
             arrows: 0.0,
+            arrows_of: Arrows::default(),
             arrow_every: 1,
             trails: false,
             shadows: true,
             crevices: 14,
             edges: true,
             samples: 2,
+            coarse: 1,
             stereo: 0.0,
         }
     }

@@ -143,6 +143,11 @@ pub fn devices() -> Vec<DeviceInfo> {
 #[cfg(feature = "gpu")]
 pub use device::{Gpu, instance};
 
+/// Without GPU support there is no device.
+#[cfg(not(feature = "gpu"))]
+#[derive(Clone, Debug)]
+pub enum Gpu {}
+
 #[cfg(feature = "gpu")]
 mod device {
     use std::panic::{AssertUnwindSafe, catch_unwind};

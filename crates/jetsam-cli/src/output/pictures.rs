@@ -95,7 +95,7 @@ impl Painter {
     fn new(pictures: &PictureArgs, scene: &Scene, world: &World) -> miette::Result<Self> {
         let [width, height] = pictures.size;
         let show = Show::new(scene, world, width as f32 / height as f32);
-        let style = pictures.style();
+        let style = pictures.style.style();
         let special = style != Style::default();
         let on_gpu = match pictures.renderer {
             Renderer::Gpu => true,

@@ -45,9 +45,9 @@ struct Look {
     segment: vec4<u32>,
     // radii of balls: fluid, bodies, fluid as its surface, fluid as thickness (m)
     radius: vec4<f32>,
-    // length of arrows (s), width of arrows (m), shadow strength, sky taps
+    // time of arrows (s), width of arrows (m), strength of shadows, looks at the surroundings
     arrow: vec4<f32>,
-    // radius of smoothing (m), threshold (m), step, kind of filter
+    // radius of smoothing (m), its range (m), step; 1 where arrows are accelerations
     smoothing: vec4<f32>,
     map: array<vec4<f32>, 64>,
 }

@@ -70,11 +70,11 @@ fn compose(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
 
 @group(1) @binding(4) var<uniform> resolve_to: vec4<f32>;
 
-// Averages `resolve_to.z` squared samples and encodes sRGB. The picture begins at `resolve_to.xy` of the target.
+// Averages `resolve_to.z` squared samples, which are `resolve_to.w` pixels wide, and encodes sRGB. The picture begins at `resolve_to.xy` of the target.
 @fragment
 fn resolve(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     let n = i32(resolve_to.z);
-    let corner = vec2<i32>(at.xy - resolve_to.xy) * n;
+    let corner = vec2<i32>((at.xy - resolve_to.xy) / resolve_to.w) * n;
     var sum = vec3(0.0);
     for (var y = 0; y < n; y++) {
         for (var x = 0; x < n; x++) {

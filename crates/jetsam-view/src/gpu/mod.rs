@@ -183,7 +183,7 @@ impl Renderer {
         let stereo = style.stereo > 0.0;
         let [x, y, width, height] = place.rect;
         let eye_width = if stereo { (width / 2).max(1) } else { width };
-        let size = [eye_width * style.samples, height * style.samples];
+        let size = [eye_width, height].map(|s| s.div_ceil(style.coarse) * style.samples);
         if self.targets.as_ref().is_none_or(|t| t.size != size) {
             self.targets = Some(Targets::new(&self.device, size));
         }
@@ -444,7 +444,7 @@ impl Renderer {
     fn resolve_pass(&self, encoder: &mut wgpu::CommandEncoder, place: Place, eye: usize, style: &Style) {
         let t = self.targets.as_ref().expect("`draw` made them");
         let [x, y, width, height] = place.rect;
-        let to = [x as f32, y as f32, style.samples as f32, 0.0];
+        let to = [x as f32, y as f32, style.samples as f32, style.coarse as f32];
         self.queue.write_buffer(&self.resolve[eye], 0, bytemuck::bytes_of(&to));
         let whole = if style.fluid == Fluid::Surface { &t.whole } else { &t.scene };
         let entries = [(0, texture(whole)), (4, self.resolve[eye].as_entire_binding())];

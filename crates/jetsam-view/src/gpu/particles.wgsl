@@ -81,7 +81,7 @@ fn drop(@builtin(vertex_index) v: u32, @builtin(instance_index) i: u32) -> Ball 
     return outline(v, record[2u * i].xyz, look.radius.z, vec3(0.0));
 }
 
-// The fluid for its thickness: balls of a particle's own volume.
+// The fluid for its thickness: balls so large that the lattice does not show.
 @vertex
 fn share(@builtin(vertex_index) v: u32, @builtin(instance_index) i: u32) -> Ball {
     return outline(v, record[2u * i].xyz, look.radius.w, vec3(0.0));
@@ -138,16 +138,19 @@ fn disc(b: Ball) {
     }
 }
 
+// Volume of a particle over that of its ball for thickness, whose radius is 1.1 spacings.
+const THIN: f32 = 0.179362;
+
 // Length of water along the line of sight (m).
 @fragment
 fn thickness(b: Ball) -> @location(0) vec4<f32> {
     if view.far > 0.0 {
         let inside = 1.0 - dot(b.slope, b.slope);
-        return vec4(2.0 * b.center.w * sqrt(max(inside, 0.0)), 0.0, 0.0, 0.0);
+        return vec4(THIN * 2.0 * b.center.w * sqrt(max(inside, 0.0)), 0.0, 0.0, 0.0);
     }
     let h = hit(b.slope, b.center);
     if h.depth <= 0.0 {
         discard;
     }
-    return vec4(2.0 * h.half * sqrt(dot(b.slope, b.slope) + 1.0), 0.0, 0.0, 0.0);
+    return vec4(THIN * 2.0 * h.half * sqrt(dot(b.slope, b.slope) + 1.0), 0.0, 0.0, 0.0);
 }

@@ -1,6 +1,5 @@
-// The depths of a fluid's balls become a surface. Texels hold depth (m), 0 where there is no fluid.
-//
-// 0 nothing; 1 the narrow-range filter (Truong and Yuksel 2018); 2 bilateral; 3 curvature flow (van der Laan et al. 2009).
+// The depths of a fluid's balls become a surface, by one of three filters: narrow range (Truong and Yuksel 2018), bilateral, or
+// curvature flow (van der Laan et al. 2009). Texels hold depth (m), 0 where there is no fluid.
 
 @group(1) @binding(0) var depths: texture_depth_2d;
 @group(1) @binding(1) var field: texture_2d<f32>;

@@ -20,6 +20,7 @@ struct Pose {
 }
 
 @group(1) @binding(0) var<storage, read> record: array<vec4<f32>>;
+@group(1) @binding(1) var<storage, read> push: array<vec4<f32>>;
 @group(1) @binding(2) var<storage, read> tag: array<vec2<u32>>;
 @group(1) @binding(3) var<storage, read> owner: array<vec4<f32>>;
 @group(2) @binding(0) var<storage, read> pose: array<Pose>;
@@ -76,16 +77,19 @@ fn dart(@builtin(vertex_index) v: u32, @builtin(instance_index) i: u32) -> Point
     return out_at(x + size * (p.x * along + p.y * side + p.z * rise), n.x * along + n.y * side + n.z * rise, vec4(flock.rgb, 1.0));
 }
 
-// Velocity of every so many particles: a shaft and a head that face the eye.
+// Velocity or acceleration of every so many particles: a shaft and a head that face the eye.
 @vertex
 fn arrow(@builtin(vertex_index) v: u32, @builtin(instance_index) i: u32) -> Point {
-    let speed = length(record[2u * i + 1u].xyz);
-    let length = look.arrow.x * speed;
+    let t = look.arrow.x;
+    let velocity = record[2u * i + 1u].xyz;
+    let speed = length(velocity);
+    let way = select(t * velocity, 0.5 * t * t * push[i].xyz, look.smoothing.w > 0.5);
+    let length = length(way);
     let width = look.arrow.y;
-    if tag[i].x % look.segment.w != 0u || length < width || owner[tag[i].y + select(look.segment.z, 0u, i < look.segment.x)].w < 0.0 {
+    if tag[i].x % look.segment.w != 0u || length < width {
         return Point(vec4(2.0, 2.0, 0.5, 1.0), vec3(0.0), vec3(0.0), vec4(0.0));
     }
-    let along = record[2u * i + 1u].xyz / speed;
+    let along = way / length;
     let start = record[2u * i].xyz;
     let side = normalize(cross(along, start - view.eye));
     let head = min(3.0 * width, 0.5 * length);
@@ -95,7 +99,8 @@ fn arrow(@builtin(vertex_index) v: u32, @builtin(instance_index) i: u32) -> Poin
         vec2(shaft, -1.1), vec2(shaft, 1.1), vec2(length, 0.0));
     let c = corners[v];
     let p = start + c.x * along + c.y * width * side;
-    var point = out_at(p, vec3(0.0), vec4(colored(speed), 0.5));
+    let color = select(colored(speed), vec3(0.75, 0.06, 0.03), look.smoothing.w > 0.5);
+    var point = out_at(p, vec3(0.0), vec4(color, 0.5));
     // in front of the particle it belongs to
     point.at.z *= 1.0 + 2.0 * look.radius.x / max(point.at.w, 1e-6);
     return point;

@@ -1,6 +1,6 @@
 //! Pictures without a window: a renderer, a texture to draw to, and the way back to the host.
 
-use super::{Place, Renderer};
+use super::{Particles, Place, Renderer};
 use crate::{Frame, Image, Line, Show, Style};
 use jetsam::gpu::{Gpu, GpuError};
 
@@ -49,20 +49,33 @@ impl Studio {
         self.renderer.show()
     }
 
-    /// Where the renderer is told of other scenes.
-    pub fn renderer(&mut self) -> &mut Renderer {
-        &mut self.renderer
-    }
-
     /// A picture of a frame by the scene's own camera.
     ///
     /// # Errors
     /// A device that refuses, is lost, or has too little memory.
     pub fn picture(&mut self, frame: &Frame, style: &Style, lines: &[Line]) -> Result<Image, GpuError> {
+        self.take(|renderer| renderer.load(frame), style, lines)
+    }
+
+    /// The same of particles in the simulation's own buffers: see [`Renderer::borrow`].
+    ///
+    /// # Errors
+    /// As [`Studio::picture`].
+    pub fn picture_of(
+        &mut self,
+        particles: Particles,
+        frame: &Frame,
+        style: &Style,
+        lines: &[Line],
+    ) -> Result<Image, GpuError> {
+        self.take(|renderer| renderer.borrow(particles, frame), style, lines)
+    }
+
+    fn take(&mut self, load: impl FnOnce(&mut Renderer), style: &Style, lines: &[Line]) -> Result<Image, GpuError> {
         let Self { gpu, renderer, texture, back, size } = self;
         let [width, height] = *size;
         gpu.attempt(|| {
-            renderer.load(frame);
+            load(renderer);
             let target = texture.create_view(&wgpu::TextureViewDescriptor::default());
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let place = Place { target: &target, rect: [0, 0, width, height], clear: true };

@@ -2,7 +2,7 @@
 
 use crate::camera::View;
 use crate::paint::{RADIUS, SHEER};
-use crate::style::{ColorBy, Fluid, Smoothing, Style};
+use crate::style::{Arrows, ColorBy, Fluid, Smoothing, Style};
 use crate::{Camera, Show};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -105,8 +105,9 @@ pub fn light() -> Vec3 {
     crate::Options::default().light.normalize()
 }
 
-/// Radius of a ball of the same volume as a cube, in edges of the cube.
-const BALL: f32 = 0.620_35;
+/// Radius of the balls that make thickness, in spacings: large enough that the lattice does not show.
+/// `THIN` of `particles.wgsl` goes with it.
+const BLUR: f32 = 1.1;
 
 impl LookUniform {
     /// `first` are the first rigid and the first static particle.
@@ -140,10 +141,10 @@ impl LookUniform {
                 if style.fluid == Fluid::Points { 0.02 } else { style.radius.unwrap_or(usual) } * dx,
                 RADIUS * dx,
                 1.05 * dx,
-                BALL * dx,
+                BLUR * dx,
             ],
             arrow: [style.arrows, 0.14 * dx, if style.shadows { 1.0 } else { 0.0 }, style.crevices as f32],
-            smoothing: [strong * dx, 0.8 * dx, 0.22, 0.0],
+            smoothing: [strong * dx, 0.8 * dx, 0.22, f32::from(u8::from(style.arrows_of == Arrows::Force))],
             map: std::array::from_fn(|k| {
                 let [r, g, b] = style.map.at(k as f32 / 63.0);
                 [r, g, b, 1.0]
