@@ -135,6 +135,8 @@ pub struct Style {
     pub trails: bool,
     /// Whether the sun throws shadows.
     pub shadows: bool,
+    /// Edge of the sun's depth map in texels.
+    pub shadow_size: u32,
     /// Looks at the surroundings of a pixel for the darkness of crevices: 0 for none.
     pub crevices: u32,
     /// Whether the edges of the domain are drawn.
@@ -164,6 +166,7 @@ impl Default for Style {
             arrow_every: 1,
             trails: false,
             shadows: true,
+            shadow_size: 2048,
             crevices: 14,
             edges: true,
             samples: 2,

@@ -183,6 +183,38 @@ fn parameters_change_while_the_world_runs() {
 }
 
 #[test]
+fn taking_over_the_same_scene_changes_nothing() {
+    let ball = "
+        [[rigid]]
+        shape = { sphere = { center = [0, 0, 0], radius = 0.1 } }
+        density = 500
+        position = [0, 0, 0.32]
+    ";
+    let scene = scene(&format!("{TANK}{ball}"));
+    let run = |interrupted: bool| {
+        let mut world = World::from_scene(&scene).unwrap();
+        world.advance(0.1, |_, step| step.trouble.is_none());
+        if interrupted {
+            world.take_over(scene.assemble().unwrap()).map_err(|e| e.0).unwrap();
+        }
+        world.advance(0.15, |_, step| step.trouble.is_none());
+        let places: Vec<_> = world.fluid().map(|r| r.x).collect();
+        let ids = world.state().particles.id[..places.len()].to_vec();
+        let mut all: Vec<_> = ids.into_iter().zip(places).collect();
+        all.sort_by_key(|p| p.0);
+        (all, world.state().bodies.body[0].x, world.ledger().kinetic)
+    };
+    let ((a, body_a, energy_a), (b, body_b, energy_b)) = (run(false), run(true));
+    let apart = a.iter().zip(&b).map(|(a, b)| {
+        assert_eq!(a.0, b.0);
+        glam::Vec3::from(a.1).distance(b.1.into())
+    });
+    let apart = apart.fold(0.0, f32::max);
+    assert!(apart < 1e-5 && body_a.distance(body_b) < 1e-6, "{apart} m");
+    assert!((energy_a - energy_b).abs() < 1e-4 * energy_a);
+}
+
+#[test]
 fn a_heavier_body_keeps_its_motion() {
     let first = scene(&format!("{BLOCK}velocity = [0.5, 0, 0]\nspin = [0, 2, 1]"));
     let mut world = World::from_scene(&first).unwrap();

@@ -86,7 +86,7 @@ fn colored(value: f32) -> vec3<f32> {
 
 fn sky(direction: vec3<f32>) -> vec3<f32> {
     let rise = normalize(direction).z;
-    return mix(look.below, look.above, smoothstep(-0.15, 0.55, rise));
+    return mix(look.below, look.above, smoothstep(-0.35, 0.30, rise));
 }
 
 // A triangle that covers the picture.

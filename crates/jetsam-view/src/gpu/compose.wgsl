@@ -64,8 +64,10 @@ fn compose(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     let fresnel = 0.02 + 0.98 * pow(1.0 - cosine, 5.0);
     let mirrored = sky(reflect(direction, normal));
     let half = normalize(look.light - direction);
-    let gloss = 1.2 * pow(max(dot(normal, half), 0.0), 220.0);
-    return vec4(mix(inside, mirrored, fresnel) + gloss, z);
+    // of a single drop little is seen
+    let whole = 1.0 - exp(-3.0 * water / look.grain);
+    let gloss = 1.2 * whole * pow(max(dot(normal, half), 0.0), 220.0);
+    return vec4(mix(inside, mirrored, whole * fresnel) + gloss, z);
 }
 
 @group(1) @binding(4) var<uniform> resolve_to: vec4<f32>;

@@ -23,7 +23,7 @@ use crate::style::{Fluid, STEREO, Smoothing, Style};
 use crate::{Camera, Frame, Line, Show};
 use buffers::{Growing, Solid, Stroke};
 use pipelines::{Layouts, Pipelines};
-use targets::{SHADOW, Targets, VEIL};
+use targets::{Targets, VEIL};
 use uniforms::{LookUniform, ViewUniform, light};
 use wgpu::BufferUsages as Usage;
 
@@ -46,7 +46,8 @@ pub struct Renderer {
     pipelines: Pipelines,
     show: Show,
     targets: Option<Targets>,
-    shadow: wgpu::TextureView,
+    /// The sun's depths, and the edge of their map in texels.
+    shadow: (wgpu::TextureView, u32),
     veil: wgpu::TextureView,
     compare: wgpu::Sampler,
     filter: wgpu::Sampler,
@@ -67,6 +68,8 @@ pub struct Renderer {
     strokes: Growing,
     stroke_count: u32,
     style_of_owners: Option<crate::style::Bodies>,
+    /// Rectangle and style of the last picture.
+    last: Option<([u32; 4], Style)>,
 }
 
 impl Renderer {
@@ -97,7 +100,7 @@ impl Renderer {
         let particles = lent(&own, [0; 3], [0; 3]);
         let mut renderer = Self {
             targets: None,
-            shadow: targets::texture(device, "shadow", [SHADOW; 2], targets::DEPTH),
+            shadow: (targets::texture(device, "shadow", [16; 2], targets::DEPTH), 16),
             veil: targets::texture(device, "veil", [VEIL; 2], targets::WATER),
             compare: sampler(Some(wgpu::CompareFunction::Greater), wgpu::FilterMode::Linear),
             filter: sampler(None, wgpu::FilterMode::Linear),
@@ -116,6 +119,7 @@ impl Renderer {
             strokes: Growing::new(device, "lines", Usage::VERTEX),
             stroke_count: 0,
             style_of_owners: None,
+            last: None,
             show: show.clone(),
             device: device.clone(),
             queue: queue.clone(),
@@ -187,6 +191,10 @@ impl Renderer {
         if self.targets.as_ref().is_none_or(|t| t.size != size) {
             self.targets = Some(Targets::new(&self.device, size));
         }
+        if self.shadow.1 != style.shadow_size {
+            let texels = style.shadow_size;
+            self.shadow = (targets::texture(&self.device, "shadow", [texels; 2], targets::DEPTH), texels);
+        }
         self.prepare(style, lines);
         let aside = 0.5 * STEREO * style.stereo * camera.eye.distance(camera.target);
         let points = if style.fluid == Fluid::Points { 1.5 * style.samples as f32 } else { 0.0 };
@@ -199,6 +207,14 @@ impl Renderer {
             self.eye_passes(encoder, k, style);
             self.resolve_pass(encoder, Place { rect, clear: place.clear && k == 0, ..place }, k, style);
         }
+        self.last = (!stereo).then(|| (place.rect, style.clone()));
+    }
+
+    /// Puts the last picture to its place once more. False when there is none of that size, or it was two pictures.
+    pub fn again(&self, encoder: &mut wgpu::CommandEncoder, place: Place) -> bool {
+        let Some((rect, style)) = self.last.as_ref().filter(|(rect, _)| *rect == place.rect) else { return false };
+        self.resolve_pass(encoder, Place { rect: *rect, ..place }, 0, style);
+        true
     }
 
     /// Writes what all passes of a picture read.
@@ -209,9 +225,9 @@ impl Renderer {
             self.style_of_owners = Some(style.bodies);
         }
         let first = [self.particles.first[1], self.particles.first[2]];
-        let look = LookUniform::new(&self.show, style, first, SHADOW);
+        let look = LookUniform::new(&self.show, style, first);
         queue.write_buffer(&self.look, 0, bytemuck::bytes_of(&look));
-        let sun = ViewUniform::sun(self.show.bounds[0], self.show.bounds[1], light(), SHADOW);
+        let sun = ViewUniform::sun(self.show.bounds[0], self.show.bounds[1], light(), style.shadow_size);
         queue.write_buffer(&self.views[2], 0, bytemuck::bytes_of(&sun));
         let edges: &[Line] = if style.edges { &self.show.edges } else { &[] };
         let width = 1.2 * style.samples as f32;
@@ -289,7 +305,7 @@ impl Renderer {
     fn sun_pass(&self, encoder: &mut wgpu::CommandEncoder, style: &Style) {
         let (view, particles) = (self.view_group(2), self.particle_group());
         {
-            let mut pass = begin(encoder, "sun", &[], Some((&self.shadow, 0.0)));
+            let mut pass = begin(encoder, "sun", &[], Some((&self.shadow.0, 0.0)));
             if style.shadows {
                 pass.set_bind_group(0, &view, &[]);
                 pass.set_bind_group(1, &particles, &[]);
@@ -309,7 +325,7 @@ impl Renderer {
         if style.shadows && style.fluid == Fluid::Surface {
             pass.set_bind_group(0, &view, &[]);
             pass.set_bind_group(1, &particles, &[]);
-            pass.set_pipeline(&self.pipelines.veil);
+            pass.set_pipeline(&self.pipelines.thickness);
             pass.draw(0..4, self.range(0));
         }
     }
@@ -352,7 +368,7 @@ impl Renderer {
                 (0, texture(&t.albedo)),
                 (1, texture(&t.normal)),
                 (2, texture(&t.depth)),
-                (3, texture(&self.shadow)),
+                (3, texture(&self.shadow.0)),
                 (4, wgpu::BindingResource::Sampler(&self.compare)),
                 (5, self.views[2].as_entire_binding()),
                 (6, texture(&self.veil)),
@@ -405,6 +421,9 @@ impl Renderer {
                 let pipeline = if narrow { &self.pipelines.narrow } else { &self.pipelines.bilateral };
                 for _ in 0..style.passes {
                     self.ways.iter().for_each(|way| step(pipeline, Some(way)));
+                }
+                if narrow {
+                    step(&self.pipelines.tidy, None);
                 }
             }
             // many small steps

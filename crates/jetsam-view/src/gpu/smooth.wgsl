@@ -58,15 +58,38 @@ fn narrow(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
             wa = 0.0;
             wb = 0.0;
         }
-        // before the range: held at its edge
-        a = select(a, z - delta, a < low);
-        b = select(b, z - delta, b < low);
+        // before the range: held a little before this pixel
+        a = select(a, z - 0.2 * delta, a < low);
+        b = select(b, z - 0.2 * delta, b < low);
         if wa > 0.0 {
             low = min(low, min(a, b) - delta);
             high = max(high, max(a, b) + delta);
         }
         sum += wa * a + wb * b;
         weight += wa + wb;
+    }
+    return vec4(sum / weight, 0.0, 0.0, 0.0);
+}
+
+// The last pass of the narrow-range filter, in two dimensions: what separable passes leave of rows and columns goes.
+@fragment
+fn tidy(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
+    let p = vec2<i32>(at.xy);
+    let z = depth_at(p);
+    if z == 0.0 {
+        return vec4(0.0);
+    }
+    var sum = 0.0;
+    var weight = 0.0;
+    for (var y = -2; y <= 2; y++) {
+        for (var x = -2; x <= 2; x++) {
+            let a = depth_at(p + vec2(x, y));
+            if a != 0.0 && abs(a - z) < look.smoothing.y {
+                let g = exp(-0.25 * f32(x * x + y * y));
+                sum += g * a;
+                weight += g;
+            }
+        }
     }
     return vec4(sum / weight, 0.0, 0.0, 0.0);
 }

@@ -1,7 +1,5 @@
 //! The pictures between the passes. Made anew when the size changes.
 
-/// Edge of the sun's depth map.
-pub const SHADOW: u32 = 2048;
 /// Edge of the sun's map of water.
 pub const VEIL: u32 = 512;
 

@@ -111,7 +111,7 @@ const BLUR: f32 = 1.1;
 
 impl LookUniform {
     /// `first` are the first rigid and the first static particle.
-    pub fn new(show: &Show, style: &Style, first: [u32; 2], shadow_size: u32) -> Self {
+    pub fn new(show: &Show, style: &Style, first: [u32; 2]) -> Self {
         let options = crate::Options::default();
         let dx = show.spacing;
         let [low, high] = style.scale(show);
@@ -123,7 +123,7 @@ impl LookUniform {
         let strong = if style.smoothing == Smoothing::CurvatureFlow { 0.9 } else { 2.4 };
         Self {
             light: light().to_array(),
-            soft: 2.2e-3 * shadow_size as f32,
+            soft: 2.2e-3 * style.shadow_size as f32,
             above: options.above,
             ground: show.ground.unwrap_or(0.0),
             below: options.below,

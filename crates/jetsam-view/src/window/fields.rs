@@ -3,7 +3,6 @@
 use egui::{DragValue, Slider, Ui};
 use jetsam::params::{PARAMS, Param};
 use jetsam::scene::{Scene, schema, schema_place};
-use std::collections::BTreeMap;
 use toml::Value;
 
 /// A number, or a vector of numbers, of the scene.
@@ -23,8 +22,6 @@ pub struct Field {
 #[derive(Clone, Debug, Default)]
 pub struct Fields {
     groups: Vec<(String, Vec<Field>)>,
-    /// What was changed and has not come back from the simulation yet.
-    edits: BTreeMap<String, String>,
     /// Only paths that hold this text are shown.
     pub search: String,
 }
@@ -50,7 +47,7 @@ impl Fields {
                 }
             }
         }
-        Self { groups, edits: BTreeMap::new(), search }
+        Self { groups, search }
     }
 
     /// Number of fields.
@@ -60,7 +57,7 @@ impl Fields {
 
     /// Draws the fields; returns what was changed as `key=value`.
     pub fn ui(&mut self, ui: &mut Ui) -> Vec<String> {
-        let Self { groups, edits, search } = self;
+        let Self { groups, search } = self;
         ui.horizontal(|ui| {
             ui.label("find");
             ui.text_edit_singleline(search);
@@ -80,7 +77,6 @@ impl Fields {
                     egui::Grid::new(name.as_str()).num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| {
                         for field in fields.iter_mut().filter(|f| shown(f)) {
                             if let Some(text) = field.ui(ui) {
-                                edits.insert(field.path.clone(), text.clone());
                                 changes.push(format!("{}={text}", field.path));
                             }
                             ui.end_row();
@@ -136,9 +132,9 @@ impl Field {
         ui.add(slider).on_hover_text(self.hint());
         let mut reset = false;
         if p.default.is_some_and(|d| d != x) {
-            reset = ui.small_button("↺").on_hover_text("back to the default").clicked();
+            reset = ui.small_button("<").on_hover_text("back to the default").clicked();
         } else if p.default.is_none() && self.may_be_derived() {
-            reset = ui.small_button("×").on_hover_text("derive it").clicked();
+            reset = ui.small_button("x").on_hover_text("derive it").clicked();
         }
         if reset {
             match p.default {

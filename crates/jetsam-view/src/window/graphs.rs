@@ -50,7 +50,8 @@ impl History {
             ("real-time factor", format!("{:.3}", n.real_time_factor)),
             ("picture", format!("{:.1} ms, {:.0}/s", self.picture_ms, self.pictures)),
             ("step", format!("{:.2} ms of {:.3} ms ({bound})", n.step_ms, 1e3 * n.dt)),
-            ("particles", format!("{} fluid, {} rigid, {} static", n.ledger.fluid, n.rigid, n.fixed)),
+            ("fluid", format!("{} particles", n.fluid)),
+            ("bodies", format!("{} particles, {} of walls", n.rigid, n.fixed)),
             ("bodies, agents", format!("{}, {}", n.bodies, n.agents)),
             (
                 "density error",
@@ -85,22 +86,22 @@ fn stages(ui: &mut Ui, n: &Numbers) {
     let total: f64 = n.stage_ms.0.iter().map(|s| s.1).sum();
     for (stage, ms) in &n.stage_ms.0 {
         ui.horizontal(|ui| {
-            let (rect, _) = ui.allocate_exact_size(vec2(220.0, 13.0), Sense::hover());
+            let (rect, _) = ui.allocate_exact_size(vec2(310.0, 15.0), Sense::hover());
             let share = if total > 0.0 { (ms / total) as f32 } else { 0.0 };
-            let bar = Rect::from_min_size(rect.min + vec2(74.0, 2.0), vec2(90.0 * share, 9.0));
+            let bar = Rect::from_min_size(rect.min + vec2(74.0, 2.0), vec2(170.0 * share, 10.0));
             ui.painter().rect_filled(bar, 1.0, Color32::from_rgb(70, 130, 200));
             let text = ui.visuals().text_color();
             let font = egui::FontId::proportional(11.0);
             let left = egui::Align2::LEFT_CENTER;
             ui.painter().text(rect.left_center(), left, stage.name(), font.clone(), text);
-            let at = rect.left_center() + vec2(168.0, 0.0);
+            let at = rect.left_center() + vec2(250.0, 0.0);
             ui.painter().text(at, left, format!("{ms:.2} ms"), font, text);
         });
     }
 }
 
 fn graph(ui: &mut Ui, name: &str, values: &VecDeque<(f64, f64)>) {
-    let (rect, _) = ui.allocate_exact_size(vec2(220.0, 44.0), Sense::hover());
+    let (rect, _) = ui.allocate_exact_size(vec2(310.0, 48.0), Sense::hover());
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     let font = egui::FontId::proportional(10.0);

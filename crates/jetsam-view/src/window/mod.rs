@@ -102,7 +102,7 @@ impl ApplicationHandler<()> for App {
     }
 
     fn user_event(&mut self, _: &ActiveEventLoop, (): ()) {
-        self.live.iter_mut().for_each(|live| live.fresh = true);
+        self.live.iter_mut().for_each(|live| live.stale = true);
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
@@ -149,9 +149,14 @@ struct Live {
     mouse: Mouse,
     keys: HashSet<KeyCode>,
     control: bool,
-    /// Something new came from the simulation, or the user did something.
+    /// The panels are out of date.
     fresh: bool,
+    /// So is the picture: there is something new from the simulation, or it is seen in another way.
+    stale: bool,
     egui_wants: Option<Instant>,
+    /// When a fine picture is drawn, unless something happens before; whether the next one is.
+    fine: Option<Instant>,
+    resting: bool,
     pacer: Pacer,
     flown: Instant,
     title: String,
@@ -194,6 +199,9 @@ struct Pacer {
 /// A picture that takes longer than this (ms) is late; much less than it is early.
 const LATE: f64 = 45.0;
 
+/// All is quiet when nothing has happened for about this long.
+const QUIET: Duration = Duration::from_millis(250);
+
 impl Pacer {
     fn new(software: bool) -> Self {
         Self {
@@ -216,29 +224,43 @@ impl Pacer {
         self.began + if took > Duration::from_millis(20) { 2 * took } else { took }
     }
 
-    fn begin(&mut self, queue: &wgpu::Queue) {
+    fn begin(&mut self, queue: &wgpu::Queue, picture: bool, rests: bool) {
         let (drawing, took_us, began) = (self.drawing.clone(), self.took_us.clone(), Instant::now());
         drawing.store(true, Relaxed);
+        if !picture {
+            return queue.on_submitted_work_done(move || drawing.store(false, Relaxed));
+        }
         self.began = began;
+        self.counted.1 += 1;
         queue.on_submitted_work_done(move || {
             took_us.store(began.elapsed().as_micros() as u64, Relaxed);
             drawing.store(false, Relaxed);
         });
         let ms = 1e3 * self.took().as_secs_f64();
+        if rests {
+            return;
+        }
         self.late = if ms > LATE { self.late + 1 } else { 0 };
-        if self.late > 4 && self.thrift < 3 {
+        if self.late > 2 && self.thrift < 3 {
             (self.thrift, self.late) = (self.thrift + 1, 0);
         }
     }
 
-    /// The style with less of what costs most.
-    fn thrifty(&self, style: &Style) -> Style {
+    /// The style with less of what costs most. Of a world that rests there is time for a fine picture.
+    fn thrifty(&self, style: &Style, rests: bool) -> Style {
         let mut style = style.clone();
+        if rests {
+            // but it must not keep the user waiting
+            if self.took() > Duration::from_millis(150) {
+                (style.samples, style.shadow_size) = (1, 1024);
+            }
+            return style;
+        }
         if self.thrift >= 1 {
             style.samples = 1;
         }
         if self.thrift >= 2 {
-            style.crevices = 0;
+            (style.crevices, style.shadow_size) = (0, 1024);
         }
         if self.thrift >= 3 {
             style.coarse = 2;
@@ -312,29 +334,36 @@ impl Live {
             keys: HashSet::new(),
             control: false,
             fresh: true,
+            stale: true,
             egui_wants: None,
+            fine: None,
+            resting: false,
             pacer,
             flown: Instant::now(),
             title: String::new(),
         })
     }
 
-    /// When to wake up next; asks for a picture when one is due.
+    /// When to wake up next; asks for a redraw when one is due. Panels are redrawn at once, pictures when the pacer lets them.
     fn next(&mut self) -> ControlFlow {
         let _ = self.gpu.device.poll(wgpu::PollType::Poll);
         let now = Instant::now();
-        let wanted = self.fresh || self.flying() || self.egui_wants.is_some_and(|at| at <= now);
         if self.pacer.drawing.load(Relaxed) {
             return ControlFlow::WaitUntil(now + Duration::from_millis(2));
         }
-        if wanted && now >= self.pacer.ready() {
+        self.stale |= self.flying();
+        let due = |at: Instant| at <= now;
+        let fine = self.fine.filter(|_| !self.panels.playing && !self.stale);
+        self.resting = fine.is_some_and(due);
+        let picture = self.stale && due(self.pacer.ready());
+        if self.fresh || picture || self.resting || self.egui_wants.is_some_and(due) {
             self.window.request_redraw();
             return ControlFlow::Wait;
         }
-        match (wanted, self.egui_wants) {
-            (true, _) => ControlFlow::WaitUntil(self.pacer.ready()),
-            (false, Some(at)) => ControlFlow::WaitUntil(at),
-            (false, None) => ControlFlow::Wait,
+        let ready = self.stale.then(|| self.pacer.ready());
+        match ready.into_iter().chain(self.egui_wants).chain(fine).min() {
+            Some(at) => ControlFlow::WaitUntil(at),
+            None => ControlFlow::Wait,
         }
     }
 
@@ -380,30 +409,46 @@ impl Live {
 
     fn redraw(&mut self) -> Result<(), WindowError> {
         self.fresh = false;
-        self.look();
-        self.fly();
+        let look = self.resting || self.stale && Instant::now() >= self.pacer.ready();
+        if look {
+            self.look();
+            self.fly();
+            // a coarse picture is followed by a fine one when all is quiet
+            let soon = Instant::now() + 2 * self.pacer.took().max(QUIET);
+            self.fine = (!self.resting && self.pacer.thrift > 0).then_some(soon);
+            self.stale = false;
+        } else {
+            let shown = self.sim.shown();
+            self.panels.note(&shown);
+        }
         let input = self.egui.take_egui_input(&self.window);
         let context = self.egui.egui_ctx().clone();
         let (mut orders, mut wish, mut rect) = (Vec::new(), None, egui::Rect::NOTHING);
+        let style = self.panels.style.clone();
         let (panels, renderer) = (&mut self.panels, &self.renderer);
         let output = context.run_ui(input, |ui| {
             wish = panels.ui(ui, &mut orders);
             rect = ui.available_rect_before_wrap();
             if let Some(renderer) = renderer {
                 panels::legend(ui, rect, renderer.show(), &panels.style);
+                panels::headline(ui, rect, panels);
             }
         });
         orders.into_iter().for_each(|order| self.sim.order(order));
         if let (Some(Wish::Home), Some(renderer)) = (wish, &self.renderer) {
             self.camera = renderer.show().camera;
+            self.stale = true;
         }
         self.egui.handle_platform_output(&self.window, output.platform_output);
         let wait = output.viewport_output.get(&egui::ViewportId::ROOT).map(|v| v.repaint_delay);
         self.egui_wants = wait.and_then(|delay| Instant::now().checked_add(delay));
         let scale = output.pixels_per_point;
-        self.mouse.rect = self.picture_rect(rect, scale);
+        let rect = self.picture_rect(rect, scale);
+        // of another place or look the picture is drawn at once
+        let changed = rect != self.mouse.rect || style != self.panels.style;
+        self.mouse.rect = rect;
         let primitives = context.tessellate(output.shapes, scale);
-        self.present(&primitives, &output.textures_delta, scale)?;
+        self.present(&primitives, &output.textures_delta, scale, look || changed)?;
         self.tell_title();
         Ok(())
     }
@@ -424,6 +469,7 @@ impl Live {
         primitives: &[egui::ClippedPrimitive],
         textures: &egui::TexturesDelta,
         scale: f32,
+        picture: bool,
     ) -> Result<(), WindowError> {
         use wgpu::CurrentSurfaceTexture as Current;
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
@@ -434,7 +480,7 @@ impl Live {
             Current::Success(texture) | Current::Suboptimal(texture) => texture,
             Current::Outdated | Current::Lost => {
                 self.surface.configure(device, &self.config);
-                self.fresh = true;
+                (self.fresh, self.stale) = (true, true);
                 return Ok(());
             }
             _ => return Ok(()),
@@ -446,9 +492,12 @@ impl Live {
             let place = Place { target: &view, rect: self.mouse.rect, clear: true };
             let drawn = self.renderer.is_some();
             if let Some(renderer) = &mut self.renderer {
-                let style = self.pacer.thrifty(&self.panels.style);
-                let lines = if style.trails { self.trails.lines(4.0 * renderer.show().spacing) } else { Vec::new() };
-                renderer.draw(&mut encoder, place, &self.camera, &style, &lines);
+                let style = self.pacer.thrifty(&self.panels.style, self.resting);
+                if picture || !renderer.again(&mut encoder, place) {
+                    let jump = 4.0 * renderer.show().spacing;
+                    let lines = if style.trails { self.trails.lines(jump) } else { Vec::new() };
+                    renderer.draw(&mut encoder, place, &self.camera, &style, &lines);
+                }
             }
             let size_in_pixels = [self.config.width, self.config.height];
             let screen = ScreenDescriptor { size_in_pixels, pixels_per_point: scale };
@@ -472,7 +521,7 @@ impl Live {
             }
             commands.push(encoder.finish());
             queue.submit(commands);
-            self.pacer.begin(queue);
+            self.pacer.begin(queue, picture, self.resting);
             queue.present(texture);
             Ok(())
         })?;
@@ -483,8 +532,7 @@ impl Live {
 
     /// Pictures a second.
     fn count(&mut self) {
-        let (since, pictures) = &mut self.pacer.counted;
-        *pictures += 1;
+        let (since, pictures) = &self.pacer.counted;
         let seconds = since.elapsed().as_secs_f64();
         if seconds > 1.0 {
             self.panels.history.pictures = f64::from(*pictures) / seconds;
@@ -520,7 +568,7 @@ impl Live {
             WindowEvent::Resized(size) => {
                 (self.config.width, self.config.height) = (size.width.max(1), size.height.max(1));
                 self.surface.configure(&self.gpu.device, &self.config);
-                self.fresh = true;
+                (self.fresh, self.stale) = (true, true);
             }
             WindowEvent::DroppedFile(path) => {
                 let over = self.pointed();
@@ -539,7 +587,7 @@ impl Live {
                     MouseScrollDelta::PixelDelta(p) => p.y as f32 / 40.0,
                 };
                 fly::zoom(&mut self.camera, 0.9f32.powf(lines));
-                self.fresh = true;
+                self.stale = true;
             }
             WindowEvent::ModifiersChanged(modifiers) => self.control = modifiers.state().control_key(),
             WindowEvent::Focused(false) => self.keys.clear(),
@@ -643,11 +691,11 @@ impl Live {
                 place.into_iter().for_each(|place| self.sim.order(Order::Scare(place)));
             }
         }
-        self.fresh = true;
+        self.stale = true;
     }
 
     fn key(&mut self, code: KeyCode, again: bool) {
-        self.fresh = true;
+        (self.fresh, self.stale) = (true, true);
         let p = &mut self.panels;
         match code {
             KeyCode::KeyN => self.sim.order(Order::Step),
@@ -676,6 +724,7 @@ impl Live {
 
     /// Flies on while keys are held.
     fn fly(&mut self) {
+        // after a pause a tenth of a second counts
         let seconds = self.flown.elapsed().as_secs_f32().min(0.1);
         self.flown = Instant::now();
         if !self.flying() {

@@ -31,7 +31,6 @@ pub struct Panels {
     pub save_as: String,
     pub open: String,
     pub numbers_shown: bool,
-    pub parameters_shown: bool,
 }
 
 /// What the user wants besides orders to the simulation.
@@ -43,7 +42,7 @@ pub enum Wish {
 
 impl Panels {
     pub fn new() -> Self {
-        Self { pace: 1.0, numbers_shown: true, parameters_shown: true, ..Self::default() }
+        Self { pace: 1.0, ..Self::default() }
     }
 
     /// Takes note of the newest moment.
@@ -70,25 +69,24 @@ impl Panels {
                 wish = self.controls(ui, orders);
             });
         });
-        if self.parameters_shown {
-            Panel::right("parameters").default_size(330.0).show(ui, |ui| {
-                ui.heading(format!("Parameters ({})", self.fields.len()));
-                egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-                    let changes = self.fields.ui(ui);
-                    if !changes.is_empty() {
-                        orders.push(Order::Set(changes));
-                    }
-                });
+        Panel::right("numbers and parameters").default_size(330.0).show(ui, |ui| {
+            ui.add_space(4.0);
+            ui.horizontal(|ui| {
+                let parameters = format!("parameters ({})", self.fields.len());
+                ui.selectable_value(&mut self.numbers_shown, false, parameters);
+                ui.selectable_value(&mut self.numbers_shown, true, "numbers");
             });
-        }
-        if self.numbers_shown {
-            egui::Window::new("Numbers")
-                .anchor(Align2::LEFT_TOP, [250.0, 8.0])
-                .resizable(false)
-                .collapsible(true)
-                .title_bar(true)
-                .show(ui.ctx(), |ui| self.history.ui(ui, &self.numbers));
-        }
+            ui.separator();
+            egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                if self.numbers_shown {
+                    return self.history.ui(ui, &self.numbers);
+                }
+                let changes = self.fields.ui(ui);
+                if !changes.is_empty() {
+                    orders.push(Order::Set(changes));
+                }
+            });
+        });
         wish
     }
 
@@ -112,14 +110,14 @@ impl Panels {
     fn controls(&mut self, ui: &mut Ui, orders: &mut Vec<Order>) -> Option<Wish> {
         ui.add_space(4.0);
         ui.horizontal(|ui| {
-            if ui.button(if self.playing { "⏸ pause" } else { "▶ play" }).clicked() {
+            if ui.button(if self.playing { "pause" } else { "play" }).clicked() {
                 self.playing = !self.playing;
                 orders.push(Order::Play(self.playing));
             }
-            if ui.button("⏭ step").clicked() {
+            if ui.button("step").clicked() {
                 orders.push(Order::Step);
             }
-            if ui.button("⏮ reset").clicked() {
+            if ui.button("reset").clicked() {
                 orders.push(Order::Reset);
             }
         });
@@ -140,9 +138,6 @@ impl Panels {
         let wish = self.camera(ui);
         ui.separator();
         self.looks(ui);
-        ui.separator();
-        ui.checkbox(&mut self.numbers_shown, "numbers");
-        ui.checkbox(&mut self.parameters_shown, "parameters");
         wish
     }
 
@@ -228,6 +223,21 @@ fn choose<T: Copy + PartialEq>(ui: &mut Ui, label: &str, value: &mut T, all: &[(
             ui.selectable_value(value, *choice, *name);
         }
     });
+}
+
+/// The most important numbers, in the upper left corner of the picture.
+pub fn headline(ui: &Ui, rect: egui::Rect, panels: &Panels) {
+    let (n, h) = (&panels.numbers, &panels.history);
+    let text = format!(
+        "{:.2} s   real time x {:.3}   step {:.2} ms   picture {:.0} ms   {} particles",
+        n.time,
+        n.real_time_factor,
+        n.step_ms,
+        h.picture_ms,
+        n.fluid + n.rigid + n.fixed
+    );
+    let (font, color) = (egui::FontId::proportional(12.0), Color32::from_rgb(40, 44, 50));
+    ui.painter_at(rect).text(rect.left_top() + egui::vec2(14.0, 8.0), Align2::LEFT_TOP, text, font, color);
 }
 
 /// The scale of colours, in the lower left corner of the picture.

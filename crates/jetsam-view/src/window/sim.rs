@@ -54,6 +54,7 @@ pub struct Numbers {
     pub stage_ms: StageMillis,
     pub ledger: Ledger,
     pub momentum_residual: f64,
+    pub fluid: u32,
     pub rigid: u32,
     pub fixed: u32,
     pub bodies: usize,
@@ -395,6 +396,7 @@ impl Worker {
             let state = world.state();
             (n.time, n.steps, n.ledger) = (world.time(), world.steps(), world.ledger().clone());
             n.momentum_residual = world.momentum_residual();
+            n.fluid = state.particles.count[Kind::Fluid as usize] as u32;
             n.rigid = state.particles.count[Kind::Rigid as usize] as u32;
             n.fixed = state.particles.count[Kind::Static as usize] as u32;
             n.bodies = state.bodies.body.iter().filter(|b| !b.is_static()).count();
