@@ -63,7 +63,7 @@ pub fn has_display() -> bool {
     cfg!(any(windows, target_os = "macos")) || named("DISPLAY") || named("WAYLAND_DISPLAY")
 }
 
-/// Opens the window; returns when it is closed.
+/// Opens the window; returns when it is closed. With `JETSAM_TIMES` in the environment, stderr says when the first picture was there.
 ///
 /// # Errors
 /// No display, or no device that can draw in its window.
