@@ -119,6 +119,9 @@ pub struct Run {
 pub struct View {
     #[command(flatten)]
     pub input: Input,
+    /// What computes; a graphics processor is the one that draws.
+    #[arg(long, value_enum, default_value_t)]
+    pub backend: Backend,
     /// Wait for the space bar.
     #[arg(long)]
     pub paused: bool,

@@ -22,6 +22,7 @@ pub fn view(args: View) -> miette::Result<Outcome> {
         name: name.unwrap_or(args.input.scene),
         scene,
         playing: !args.paused,
+        backend: args.backend.into(),
         style: args.style.style(),
     };
     jetsam_view::window::open(options)?;

@@ -23,6 +23,9 @@ pub struct Frame {
     pub poses: Vec<(DVec3, DQuat)>,
     /// Agents, flock by flock.
     pub agents: Vec<Record>,
+    /// The particles, where they are on a device already: the arrays above are empty then.
+    #[cfg(feature = "gpu")]
+    pub lent: Option<jetsam::backend::OnDevice>,
 }
 
 impl Frame {
@@ -33,8 +36,28 @@ impl Frame {
         frame
     }
 
-    /// The same, in the memory of an earlier moment.
+    /// The present moment as far as it has to come home: particles stay on the device where they are on one.
+    #[cfg(feature = "gpu")]
+    pub fn borrow(&mut self, world: &World) {
+        let (Some(lent), Some((bodies, agents))) = (world.on_device(), world.movers()) else {
+            return self.take(world);
+        };
+        self.time = world.time();
+        self.record.clear();
+        self.push.clear();
+        self.tag.clear();
+        (self.first, self.count) = ([0; 3], [0; 3]);
+        self.poses = bodies.iter().map(|b| (b.x, b.q)).collect();
+        self.agents = agents;
+        self.lent = Some(lent);
+    }
+
+    /// The same as [`Frame::of`], in the memory of an earlier moment.
     pub fn take(&mut self, world: &World) {
+        #[cfg(feature = "gpu")]
+        {
+            self.lent = None;
+        }
         let state = world.state();
         let p = &state.particles;
         self.time = world.time();

@@ -56,6 +56,8 @@ pub struct Look {
     pub color: [f32; 3],
     /// Whether nothing moves it.
     pub fixed: bool,
+    /// Radius about the centre of mass (m).
+    pub radius: f32,
     /// What is drawn.
     pub form: Form,
 }
@@ -149,7 +151,9 @@ fn looks(world: &World) -> Vec<Look> {
             None if body.is_static() && body.name == "walls" => Form::Hidden,
             None => Form::Balls,
         };
-        Look { name: body.name.clone(), color, fixed: body.is_static(), form }
+        let offsets = &world.state().bodies.offset[body.slots.clone()];
+        let radius = offsets.iter().map(|o| o.length()).fold(0.0, f64::max) as f32;
+        Look { name: body.name.clone(), color, fixed: body.is_static(), radius, form }
     };
     bodies.map(look).collect()
 }

@@ -7,21 +7,6 @@ use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
-/// Particles as the GPU reads them, kind by kind: a simulation on the same device hands over its own buffers.
-#[derive(Clone, Debug)]
-pub struct Particles {
-    /// [`jetsam::state::Record`]s.
-    pub record: wgpu::Buffer,
-    /// Acceleration and relative density: four `f32`.
-    pub push: wgpu::Buffer,
-    /// Identity and owner: two `u32`.
-    pub tag: wgpu::Buffer,
-    /// First particle of each kind.
-    pub first: [u32; 3],
-    /// Particles of each kind.
-    pub count: [u32; 3],
-}
-
 /// A buffer that grows.
 pub struct Growing {
     label: &'static str,

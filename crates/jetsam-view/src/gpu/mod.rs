@@ -16,7 +16,8 @@ mod studio;
 mod targets;
 mod uniforms;
 
-pub use buffers::Particles;
+/// Particles as the GPU reads them: a simulation on the same device hands over its own buffers.
+pub use jetsam::backend::OnDevice as Particles;
 pub use studio::Studio;
 
 use crate::style::{Fluid, STEREO, Smoothing, Style};
@@ -150,8 +151,11 @@ impl Renderer {
         &self.show
     }
 
-    /// A frame whose particles come from the host.
+    /// A frame: its particles come from the host, unless they are lent.
     pub fn load(&mut self, frame: &Frame) {
+        if let Some(lent) = &frame.lent {
+            return self.borrow(lent.clone(), frame);
+        }
         let (device, queue) = (&self.device, &self.queue);
         self.own[0].fill(device, queue, &frame.record);
         self.own[1].fill(device, queue, &frame.push);

@@ -70,6 +70,16 @@ pub struct Met {
 /// The first particle on a line of sight, of those that `wanted` lets through; walls are never met.
 pub fn pick(frame: &Frame, show: &Show, ray: Ray, wanted: impl Fn(Kind) -> bool) -> Option<Met> {
     let mut nearest: Option<Met> = None;
+    if frame.lent.is_some() {
+        // the particles are not at hand: bodies as balls
+        let bodies = frame.poses.iter().zip(&show.bodies).enumerate();
+        for (k, ((x, _), look)) in bodies.filter(|(_, (_, look))| !look.fixed && wanted(Kind::Rigid)) {
+            let met = ray.meets(x.as_vec3(), 0.8 * look.radius);
+            if let Some(distance) = met.filter(|t| nearest.is_none_or(|n| *t < n.distance)) {
+                nearest = Some(Met { distance, kind: Kind::Rigid, owner: k as u32 });
+            }
+        }
+    }
     for kind in Kind::ALL.into_iter().filter(|k| wanted(*k)) {
         for i in frame.segment(kind) {
             let owner = frame.tag[i][1];

@@ -40,6 +40,8 @@ pub struct Options {
     pub scene: Scene,
     /// Whether it runs at once.
     pub playing: bool,
+    /// What computes. A GPU is the one that draws.
+    pub backend: jetsam::Choice,
     /// How it looks.
     pub style: Style,
 }
@@ -281,13 +283,17 @@ impl Live {
         let wake = move || {
             let _ = proxy.send_event(());
         };
-        let sim = Sim::start(options.name, options.scene, options.playing, wake).map_err(|e| refused(&e))?;
+        let (device, received) = std::sync::mpsc::channel();
+        let on = (options.backend, received);
+        let sim = Sim::start(options.name, options.scene, options.playing, on, wake).map_err(|e| refused(&e))?;
         let size = winit::dpi::LogicalSize::new(1440.0, 860.0);
         let attributes = Window::default_attributes().with_title("jetsam").with_inner_size(size);
         let window = Arc::new(event_loop.create_window(attributes).map_err(|e| refused(&e))?);
         let instance = instance();
         let surface = instance.create_surface(window.clone()).map_err(|e| refused(&e))?;
         let (gpu, capabilities) = Gpu::open_for(&instance, &surface)?;
+        // one that computes nothing does not listen
+        let _ = device.send(gpu.clone());
         let plain = capabilities.formats.iter().find(|f| !f.is_srgb() && f.components() == 4);
         let format = *plain.unwrap_or(&capabilities.formats[0]);
         let size = window.inner_size();

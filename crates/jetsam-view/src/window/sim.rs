@@ -2,13 +2,14 @@
 
 use crate::{Frame, Show};
 use glam::{DVec3, Vec3};
+use jetsam::assemble::Assembly;
 use jetsam::ledger::Ledger;
 use jetsam::model::DtBound;
 use jetsam::report::StageMillis;
 use jetsam::scene::{Rigid, Scene, Shape};
-use jetsam::state::Kind;
 use jetsam::world::{Grip, Mismatch};
-use jetsam::{Trouble, World};
+use jetsam::gpu::Gpu;
+use jetsam::{Choice, Trouble, World};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -89,14 +90,24 @@ pub struct Sim {
 }
 
 impl Sim {
-    /// Starts the thread with a scene; `wake` is called whenever there is something new.
-    pub fn start(name: String, scene: Scene, playing: bool, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+    /// Starts the thread with a scene on a backend of a choice, on the device that the window sends as soon as it has one; `wake` is
+    /// called whenever there is something new.
+    pub fn start(
+        name: String,
+        scene: Scene,
+        playing: bool,
+        on: (Choice, Receiver<Gpu>),
+        wake: impl Fn() + Send + 'static,
+    ) -> std::io::Result<Self> {
         let (orders, inbox) = channel();
         let shown = Arc::new(Mutex::new(Shown { playing, name: name.clone(), ..Shown::default() }));
         let theirs = shown.clone();
         let run = move || {
-            let mut worker =
-                Worker { shown: theirs, wake: Box::new(wake), playing, pace: 1.0, scene, name, world: None };
+            let (choice, device) = on;
+            // the processor need not wait for a device
+            let gpu = if choice == Choice::Cpu { None } else { device.recv().ok() };
+            let wake = Box::new(wake);
+            let mut worker = Worker { shown: theirs, wake, playing, pace: 1.0, scene, name, world: None, choice, gpu };
             worker.open(true);
             worker.run(&inbox);
         };
@@ -137,6 +148,8 @@ struct Worker {
     scene: Scene,
     name: String,
     world: Option<World>,
+    choice: Choice,
+    gpu: Option<Gpu>,
 }
 
 impl Worker {
@@ -168,11 +181,16 @@ impl Worker {
         let timers: Vec<Duration> = world.timers().map(|t| t.1).collect();
         let until = began + self.pace * MOMENT.as_secs_f64();
         let (mut trouble, mut last) = (None, None);
-        world.advance(until, |_, step| {
-            trouble = step.trouble;
-            last = Some(step);
-            trouble.is_none() && start.elapsed() < LONGEST
-        });
+        if world.on_device().is_some() {
+            // without waiting for each step
+            trouble = world.run_to(until);
+        } else {
+            world.advance(until, |_, step| {
+                trouble = step.trouble;
+                last = Some(step);
+                trouble.is_none() && start.elapsed() < LONGEST
+            });
+        }
         let wall = start.elapsed();
         let steps = (world.steps() - first).max(1) as f64;
         let mut stages = StageMillis::since(&timers, world);
@@ -182,8 +200,9 @@ impl Worker {
         if let Some(trouble) = trouble {
             self.playing = false;
             let what = match trouble {
-                Trouble::NotFinite => "values are not finite",
-                Trouble::Stalled => "the time step has collapsed",
+                Trouble::NotFinite => "values are not finite".into(),
+                Trouble::Stalled => "the time step has collapsed".into(),
+                Trouble::Device => world.fault().map_or("the device failed".into(), ToString::to_string),
             };
             self.say(format!("stopped: {what}; reset, or change what you changed last"), true);
         }
@@ -191,6 +210,7 @@ impl Worker {
         self.publish(|numbers| {
             (numbers.step_ms, numbers.stage_ms) = (step_ms, stages);
             numbers.real_time_factor = seconds / wall.max(rest + wall).as_secs_f64();
+            numbers.dt = seconds / steps;
             if let Some(step) = last {
                 (numbers.dt, numbers.bound) = (step.dt, Some(step.bound));
             }
@@ -244,14 +264,26 @@ impl Worker {
     /// Builds the world of the scene anew.
     fn open(&mut self, camera: bool) {
         self.busy("building the world");
-        match World::from_scene(&self.scene) {
-            Ok(world) => {
+        match self.scene.assemble() {
+            Ok(assembly) => {
+                self.world = self.world_of(assembly);
+                let Some(world) = &self.world else { return };
                 let doubt = world.model().warnings.first().map(|w| (format!("note: {w}"), false));
                 self.shown().message = doubt;
-                self.world = Some(world);
                 self.show(camera);
             }
             Err(e) => self.complain(&*e),
+        }
+    }
+
+    /// A world on the chosen backend.
+    fn world_of(&self, assembly: Assembly) -> Option<World> {
+        match World::choose_with(self.choice, self.gpu.as_ref(), assembly) {
+            Ok((world, _)) => Some(world),
+            Err(e) => {
+                self.complain(&e);
+                None
+            }
         }
     }
 
@@ -283,19 +315,18 @@ impl Worker {
             Ok(assembly) => {
                 self.scene = changed;
                 let world = self.world.take();
-                let taken = match world {
-                    Some(mut world) => match world.take_over(assembly) {
-                        Ok(()) => Ok(world),
-                        Err((_, assembly)) => Err(World::new(*assembly)),
-                    },
-                    None => Err(World::new(assembly)),
-                };
                 let what = values.join(", ");
-                let (world, told) = match taken {
-                    Ok(world) => (world, what),
-                    Err(world) => (world, format!("{what}: the world begins anew")),
+                let (world, told) = match world {
+                    Some(mut world) => match world.take_over(assembly) {
+                        Ok(()) => (Some(world), what),
+                        Err((_, assembly)) => (self.world_of(*assembly), format!("{what}: the world begins anew")),
+                    },
+                    None => (self.world_of(assembly), what),
                 };
-                self.world = Some(world);
+                if world.is_none() {
+                    return;
+                }
+                self.world = world;
                 self.show(false);
                 self.say(told, false);
             }
@@ -392,15 +423,13 @@ impl Worker {
         let n = &mut shown.numbers;
         fill(n);
         if let Some(world) = &self.world {
-            shown.frame.take(world);
-            let state = world.state();
+            shown.frame.borrow(world);
             (n.time, n.steps, n.ledger) = (world.time(), world.steps(), world.ledger().clone());
             n.momentum_residual = world.momentum_residual();
-            n.fluid = state.particles.count[Kind::Fluid as usize] as u32;
-            n.rigid = state.particles.count[Kind::Rigid as usize] as u32;
-            n.fixed = state.particles.count[Kind::Static as usize] as u32;
-            n.bodies = state.bodies.body.iter().filter(|b| !b.is_static()).count();
-            n.agents = state.agents.record.len();
+            let count = shown.frame.lent.as_ref().map_or(shown.frame.count, |lent| lent.count);
+            [n.fluid, n.rigid, n.fixed] = count;
+            n.bodies = world.model().contacts.iter().filter(|c| c.inverse_mass > 0.0).count();
+            n.agents = shown.frame.agents.len();
             n.backend = world.backend();
         }
         (self.wake)();
@@ -472,7 +501,8 @@ mod tests {
     #[test]
     fn the_thread_obeys() {
         let scene = Scene::open("dam-break", &["resolution.spacing=0.1".into()]).unwrap();
-        let sim = Sim::start("dam-break".into(), scene, false, || ()).unwrap();
+        let (_, device) = channel();
+        let sim = Sim::start("dam-break".into(), scene, false, (Choice::Cpu, device), || ()).unwrap();
         wait(&sim, |s| s.show.is_some() && s.serial > 0);
         assert_eq!((sim.shown().numbers.steps, sim.shown().playing), (0, false));
         sim.order(Order::Step);

@@ -53,12 +53,12 @@ pub struct OnGpu {
 #[derive(Clone, Copy, Default, PartialEq)]
 struct Flows {
     any: bool,
-    hoses: bool,
+    hoses: usize,
 }
 
 impl Flows {
     fn of(model: &Model) -> Self {
-        Self { any: !model.sources.is_empty(), hoses: program::hoses(model).next().is_some() }
+        Self { any: !model.sources.is_empty(), hoses: program::hoses(model).count() }
     }
 }
 
@@ -235,14 +235,19 @@ impl Backend for OnGpu {
     }
 
     fn sources_changed(&mut self, model: &Model, time: f64) {
-        if Flows::of(model) == self.flows || model.sources.is_empty() {
-            // what was to come is listed anew
-            (self.coming, self.known) = (VecDeque::new(), time);
+        if Flows::of(model) != self.flows {
+            let state = self.download().clone();
+            self.upload(model, state);
+            self.known = time;
             return;
         }
-        let state = self.download().clone();
-        self.upload(model, state);
-        self.known = time;
+        // what was to come is listed anew
+        (self.coming, self.known) = (VecDeque::new(), time);
+        self.attempt(|gpu, ready| {
+            let constants = layout::constants(model, ready.sizes);
+            gpu.queue.write_buffer(&ready.buffers.all[0], 0, &constants);
+            Ok(())
+        });
     }
 
     fn on_device(&self) -> Option<super::OnDevice> {
