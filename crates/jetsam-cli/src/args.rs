@@ -3,11 +3,13 @@
 use clap::{ArgGroup, Parser, Subcommand, ValueEnum};
 use jetsam::Scene;
 use jetsam::voxelize::Rule;
+use jetsam_view::style;
 use std::path::PathBuf;
 
 /// Meshes dropped into water: a particle simulator of rigid bodies and fluids.
 ///
-/// Without a command, runs the scene `monkey-splash` and writes pictures and numbers to out/monkey-splash/.
+/// Without a command, opens the scene `monkey-splash` in a window; where there is no display, runs it and writes pictures and numbers
+/// to out/monkey-splash/.
 #[derive(Parser)]
 #[command(name = "jetsam", version, max_term_width = 100)]
 pub struct Args {
@@ -19,6 +21,8 @@ pub struct Args {
 pub enum Command {
     /// Simulate a scene; write pictures and numbers.
     Run(Run),
+    /// Open a scene in a window, and put a hand in it.
+    View(View),
     /// Read a scene and say what it amounts to: particles, time step, stability margins, warnings.
     Check(Check),
     /// Turn a mesh into particles and say how well they fill it.
@@ -107,16 +111,117 @@ pub struct Run {
     /// Seed of everything random in the scene.
     #[arg(long)]
     pub seed: Option<u32>,
+    #[command(flatten)]
+    pub pictures: PictureArgs,
 }
 
-impl Run {
-    /// What plain `jetsam` does.
-    pub fn default_scene() -> Self {
-        let name = jetsam::scene::builtin::SCENES[0].name;
-        match Args::parse_from(["jetsam", "run", name]).command {
-            Some(Command::Run(run)) => run,
-            _ => unreachable!("`run` parses to Run"),
+#[derive(clap::Args, Clone)]
+pub struct View {
+    #[command(flatten)]
+    pub input: Input,
+    /// What computes; a graphics processor is the one that draws.
+    #[arg(long, value_enum, default_value_t)]
+    pub backend: Backend,
+    /// Wait for the space bar.
+    #[arg(long)]
+    pub paused: bool,
+    /// Threads to compute with; by default one a core.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    #[command(flatten)]
+    pub style: StyleArgs,
+}
+
+/// Who draws pictures.
+#[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum Renderer {
+    /// A graphics processor where there is one, or where only it can draw what is asked for.
+    #[default]
+    Auto,
+    /// A graphics processor, if only a software one.
+    Gpu,
+    /// The processor.
+    Cpu,
+}
+
+/// How pictures look.
+#[derive(clap::Args, Clone)]
+#[command(next_help_heading = "Pictures")]
+pub struct PictureArgs {
+    /// Who draws.
+    #[arg(long, value_enum, default_value_t)]
+    pub renderer: Renderer,
+    /// Width and height in pixels.
+    #[arg(long, value_parser = size, default_value = "1280x720", value_name = "WIDTHxHEIGHT")]
+    pub size: [usize; 2],
+    /// Draw the scale of colours into the picture.
+    #[arg(long)]
+    pub legend: bool,
+    #[command(flatten)]
+    pub style: StyleArgs,
+}
+
+/// How a world looks.
+#[derive(clap::Args, Clone)]
+#[command(next_help_heading = "Looks")]
+pub struct StyleArgs {
+    /// How fluids are drawn.
+    #[arg(long, value_parser = one_of(&style::Fluid::ALL), default_value = "balls", value_name = "balls|points|surface|hidden")]
+    pub fluid: style::Fluid,
+    /// How the surface of a fluid is smoothed.
+    #[arg(long, value_parser = one_of(&style::Smoothing::ALL), default_value = "narrow-range", value_name = "narrow-range|bilateral|curvature-flow|none")]
+    pub smoothing: style::Smoothing,
+    /// Draw bodies as their particles.
+    #[arg(long)]
+    pub body_particles: bool,
+    /// What colours show.
+    #[arg(long, value_parser = color_by, default_value = "speed", value_name = "speed|density|pressure|kind|owner")]
+    pub color: style::ColorBy,
+    /// The scale of colours.
+    #[arg(long, value_parser = map, default_value = "water", value_name = "water|viridis|magma|balance")]
+    pub map: jetsam_view::color::Map,
+    /// Ends of the scale of colours, in the unit of what is shown.
+    #[arg(long, value_parser = numbers::<2>, value_name = "LOW,HIGH", allow_hyphen_values = true)]
+    pub range: Option<[f64; 2]>,
+    /// Draw arrows, as long as the way of a particle in this many seconds.
+    #[arg(long, value_parser = not_negative, default_value = "0", value_name = "SECONDS")]
+    pub arrows: f64,
+    /// What arrows show: the velocity, or the force over the mass.
+    #[arg(long, value_parser = one_of(&style::Arrows::ALL), default_value = "velocity", value_name = "velocity|force")]
+    pub arrows_of: style::Arrows,
+    /// Two pictures side by side, one for each eye.
+    #[arg(long)]
+    pub stereo: bool,
+    /// Samples of a pixel along each side.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=4))]
+    pub samples: u32,
+}
+
+impl StyleArgs {
+    /// The choices for the GPU's renderer.
+    pub fn style(&self) -> style::Style {
+        style::Style {
+            fluid: self.fluid,
+            smoothing: self.smoothing,
+            bodies: if self.body_particles { style::Bodies::Particles } else { style::Bodies::Meshes },
+            color: self.color,
+            map: self.map,
+            range: self.range.map(|r| r.map(|x| x as f32)),
+            arrows: self.arrows as f32,
+            arrows_of: self.arrows_of,
+            stereo: if self.stereo { 1.0 } else { 0.0 },
+            samples: self.samples,
+            ..style::Style::default()
         }
+    }
+}
+
+impl Command {
+    /// What plain `jetsam` does.
+    pub fn default_scene(display: bool) -> Self {
+        let name = jetsam::scene::builtin::SCENES[0].name;
+        let command = if display { "view" } else { "run" };
+        Args::parse_from(["jetsam", command, name]).command.expect("a command was given")
     }
 }
 
@@ -127,6 +232,8 @@ pub enum Save {
     Png,
     /// A video of the pictures (needs ffmpeg).
     Mp4,
+    /// The pictures as an animated PNG, which browsers play (needs nothing).
+    Apng,
     /// The particles of a frame, binary PLY.
     Ply,
     /// The particles of a frame, legacy VTK.
@@ -298,6 +405,36 @@ pub struct Scenes {
 fn not_negative(text: &str) -> Result<f64, String> {
     let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if number >= 0.0 && number.is_finite() { Ok(number) } else { Err("must be finite and not negative".into()) }
+}
+
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let parts = text.split_once('x').ok_or("write WIDTHxHEIGHT, e.g. 1920x1080")?;
+    let side = |part: &str| match part.parse::<usize>() {
+        Ok(n) if (16..=8192).contains(&n) && n % 2 == 0 => Ok(n),
+        _ => Err(format!("{part} is not an even number from 16 to 8192")),
+    };
+    Ok([side(parts.0)?, side(parts.1)?])
+}
+
+/// Reads a choice by its name, written with hyphens.
+fn one_of<T: Copy + Send + Sync>(
+    all: &'static [(T, &'static str)],
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync {
+    move |text| {
+        let found = all.iter().find(|(_, name)| name.replace(' ', "-") == text);
+        let names = || all.iter().map(|(_, name)| name.replace(' ', "-")).collect::<Vec<_>>().join(", ");
+        found.map(|(choice, _)| *choice).ok_or_else(|| format!("choose one of {}", names()))
+    }
+}
+
+fn color_by(text: &str) -> Result<style::ColorBy, String> {
+    let found = style::ColorBy::ALL.iter().find(|(_, name, _)| *name == text);
+    found.map(|(choice, ..)| *choice).ok_or_else(|| "choose speed, density, pressure, kind or owner".into())
+}
+
+fn map(text: &str) -> Result<jetsam_view::color::Map, String> {
+    let found = jetsam_view::color::Map::ALL.into_iter().find(|m| m.name() == text);
+    found.ok_or_else(|| "choose water, viridis, magma or balance".into())
 }
 
 fn rule(text: &str) -> Result<Rule, String> {

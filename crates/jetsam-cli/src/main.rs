@@ -14,6 +14,7 @@ mod schema;
 mod shell;
 mod terminal;
 mod validate;
+mod view;
 mod voxelize;
 
 use args::{Args, Command};
@@ -31,8 +32,9 @@ enum Outcome {
 }
 
 fn main() -> ExitCode {
-    let done = match Args::parse().command.unwrap_or_else(|| Command::Run(args::Run::default_scene())) {
+    let done = match Args::parse().command.unwrap_or_else(|| Command::default_scene(view::has_display())) {
         Command::Run(run) => run::run(&run),
+        Command::View(view) => view::view(view),
         Command::Check(check) => check::check(&check),
         Command::Voxelize(voxelize) => voxelize::voxelize(&voxelize),
         Command::Bench(bench) => bench::bench(&bench),

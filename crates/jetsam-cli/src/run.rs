@@ -23,7 +23,7 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     for warning in &world.model().warnings {
         say(&format!("warning: {warning}"));
     }
-    let mut outputs = Outputs::create(&folder, &args.save, &scene, &world)?;
+    let mut outputs = Outputs::create(&folder, &args.save, &args.pictures, &scene, &world)?;
     let times = Frames::of(&scene, args);
     let bar = progress(times.count, &name_of(&input.scene).to_string_lossy());
     let mut recorder = Recorder::default();

@@ -26,6 +26,99 @@ pub fn water(t: f32) -> [f32; 3] {
     oklch(0.45 + 0.52 * t, 0.145 - 0.11 * t * t, 0.705 - 0.13 * t)
 }
 
+/// A scale of colours for numbers: lightness grows evenly along it, or falls evenly to both sides of its middle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Map {
+    /// [`water`].
+    #[default]
+    Water,
+    /// Purple through green to yellow (matplotlib's; van der Walt and Smith).
+    Viridis,
+    /// Black through magenta to pale yellow (the same authors).
+    Magma,
+    /// Blue below, pale in the middle, red above.
+    Balance,
+}
+
+impl Map {
+    /// All maps.
+    pub const ALL: [Map; 4] = [Map::Water, Map::Viridis, Map::Magma, Map::Balance];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Map::Water => "water",
+            Map::Viridis => "viridis",
+            Map::Magma => "magma",
+            Map::Balance => "balance",
+        }
+    }
+
+    /// The colour at `t` in [0, 1].
+    pub fn at(self, t: f32) -> [f32; 3] {
+        let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
+        match self {
+            Map::Water => water(t),
+            Map::Viridis => between(&VIRIDIS, t),
+            Map::Magma => between(&MAGMA, t),
+            Map::Balance => {
+                let side = (2.0 * t - 1.0).abs();
+                let hue = if t < 0.5 { 0.70 } else { 0.08 };
+                oklch(0.95 - 0.45 * side, 0.16 * side, hue)
+            }
+        }
+    }
+}
+
+/// Ten equal steps of viridis, sRGB bytes.
+const VIRIDIS: [[u8; 3]; 10] = [
+    [68, 1, 84],
+    [72, 40, 120],
+    [62, 74, 137],
+    [49, 104, 142],
+    [38, 130, 142],
+    [31, 158, 137],
+    [53, 183, 121],
+    [109, 205, 89],
+    [180, 222, 44],
+    [253, 231, 37],
+];
+
+/// Ten equal steps of magma, sRGB bytes.
+const MAGMA: [[u8; 3]; 10] = [
+    [0, 0, 4],
+    [24, 15, 62],
+    [69, 16, 119],
+    [114, 31, 129],
+    [159, 47, 127],
+    [205, 64, 113],
+    [241, 96, 93],
+    [253, 149, 103],
+    [254, 201, 141],
+    [252, 253, 191],
+];
+
+fn between(steps: &[[u8; 3]; 10], t: f32) -> [f32; 3] {
+    let at = 9.0 * t;
+    let k = (at as usize).min(8);
+    std::array::from_fn(|c| {
+        let mix = f32::from(steps[k][c]) + (at - k as f32) * (f32::from(steps[k + 1][c]) - f32::from(steps[k][c]));
+        linear(mix / 255.0)
+    })
+}
+
+/// Linear light of a value in [0, 1] that is encoded in sRGB.
+pub fn linear(x: f32) -> f32 {
+    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
+/// The sRGB byte that shows linear light `x`.
+pub fn byte(x: f32) -> u8 {
+    let x = x.clamp(0.0, 1.0);
+    let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+    (255.0 * encoded + 0.5) as u8
+}
+
 /// The colour of the body called `name`, the same in every run: warm, so that it stands out from water.
 ///
 /// The name without the number at its end picks a hue, and the number steps on from there by the golden ratio: numbered copies
@@ -46,10 +139,7 @@ pub fn of_name(name: &str) -> [f32; 3] {
 
 /// The byte that shows a linear value of `x` / 4096 for each index `x`, by the sRGB transfer function.
 pub(crate) fn srgb_table() -> Vec<u8> {
-    let encode = |x: f32| {
-        if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
-    };
-    (0..=4096).map(|x| (255.0 * encode(x as f32 / 4096.0) + 0.5) as u8).collect()
+    (0..=4096).map(|x| byte(x as f32 / 4096.0)).collect()
 }
 
 #[cfg(test)]
@@ -67,6 +157,23 @@ mod tests {
         assert!(y.windows(2).all(|pair| pair[0] < pair[1]), "{y:?}");
         assert_eq!(water(f32::NAN), water(0.0));
         assert_eq!(water(7.0), water(1.0));
+    }
+
+    #[test]
+    fn maps_grow_lighter_and_the_balance_is_lightest_in_its_middle() {
+        for map in [Map::Water, Map::Viridis, Map::Magma] {
+            let y: Vec<f32> = (0..=90).map(|i| luminance(map.at(i as f32 / 90.0))).collect();
+            assert!(y.windows(2).all(|pair| pair[0] < pair[1]), "{}: {y:?}", map.name());
+        }
+        let y: Vec<f32> = (0..=90).map(|i| luminance(Map::Balance.at(i as f32 / 90.0))).collect();
+        assert!(y[..46].windows(2).all(|p| p[0] < p[1]) && y[45..].windows(2).all(|p| p[0] > p[1]), "{y:?}");
+    }
+
+    #[test]
+    fn bytes_and_light_are_inverse() {
+        for b in 0..=255u8 {
+            assert_eq!(byte(linear(f32::from(b) / 255.0)), b);
+        }
     }
 
     #[test]

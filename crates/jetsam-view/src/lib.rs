@@ -1,7 +1,7 @@
 //! Pictures of jetsam worlds.
 //!
-//! [`render`] draws balls on the CPU: no window, no GPU, the same bits for any number of threads. [`color`] turns speeds
-//! and names into colours.
+//! A [`Show`] says how a scene is shown, a [`Frame`] is a moment of its world. [`paint`] draws it on the CPU: no window, no GPU, the
+//! same bits for any number of threads. [`gpu::Renderer`] draws it on a graphics processor. [`color`] turns numbers and names into colours.
 //!
 //! ```
 //! use glam::Vec3;
@@ -14,12 +14,28 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod apng;
 mod camera;
 pub mod color;
+mod frame;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod image;
+mod legend;
+mod paint;
 mod raster;
+pub mod show;
 mod splat;
+pub mod style;
+#[cfg(feature = "window")]
+pub mod window;
 
+pub use apng::Animation;
 pub use camera::Camera;
+pub use frame::Frame;
 pub use image::{Image, ImageError};
+pub use legend::{legend, number};
+pub use paint::paint;
+pub use show::Show;
 pub use splat::{Ball, Facet, Line, Options, box_edges, facets, render};
+pub use style::Style;

@@ -135,13 +135,18 @@ impl DeviceInfo {
 /// The devices of this machine, the most welcome first. Empty without the feature `gpu`.
 pub fn devices() -> Vec<DeviceInfo> {
     #[cfg(feature = "gpu")]
-    return device::adapters().into_iter().map(|(info, _)| info).collect();
+    return device::adapters(&instance()).into_iter().map(|(info, _)| info).collect();
     #[cfg(not(feature = "gpu"))]
     return Vec::new();
 }
 
 #[cfg(feature = "gpu")]
-pub(crate) use device::Gpu;
+pub use device::{Gpu, instance};
+
+/// Without GPU support there is no device.
+#[cfg(not(feature = "gpu"))]
+#[derive(Clone, Debug)]
+pub enum Gpu {}
 
 #[cfg(feature = "gpu")]
 mod device {
@@ -150,9 +155,13 @@ mod device {
 
     use super::{DeviceInfo, DeviceKind, GpuError};
 
+    /// The way to the drivers. Windows make their surfaces from the instance whose adapter is opened for them.
+    pub fn instance() -> wgpu::Instance {
+        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle())
+    }
+
     /// All adapters, the most welcome first.
-    pub fn adapters() -> Vec<(DeviceInfo, wgpu::Adapter)> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    pub fn adapters(instance: &wgpu::Instance) -> Vec<(DeviceInfo, wgpu::Adapter)> {
         let found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
         let mut adapters: Vec<_> = found.into_iter().map(|a| (describe(&a), a)).collect();
         adapters.sort_by_key(|(info, _)| info.kind);
@@ -181,10 +190,14 @@ mod device {
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
     }
 
-    /// An open device.
-    pub(crate) struct Gpu {
+    /// An open device, shared by simulation, pictures and window.
+    #[derive(Clone, Debug)]
+    pub struct Gpu {
+        /// What it is.
         pub info: DeviceInfo,
+        /// The device.
         pub device: wgpu::Device,
+        /// Where its commands go.
         pub queue: wgpu::Queue,
         /// Why it was lost, once it was.
         lost: Arc<Mutex<Option<String>>>,
@@ -192,10 +205,38 @@ mod device {
 
     impl Gpu {
         /// Opens the most welcome device, with all the limits it has; only hardware if so asked.
+        ///
+        /// # Errors
+        /// No such device, or one that refuses.
         pub fn open(only_hardware: bool) -> Result<Gpu, GpuError> {
-            let (info, adapter) = adapters()
+            Self::open_where(&instance(), |info, _| info.is_hardware() || !only_hardware)
+        }
+
+        /// Opens the most welcome device, if only a software one, whose pictures can be shown on a surface of `instance`.
+        ///
+        /// # Errors
+        /// No such device, or one that refuses.
+        pub fn open_for(
+            instance: &wgpu::Instance,
+            surface: &wgpu::Surface,
+        ) -> Result<(Gpu, wgpu::SurfaceCapabilities), GpuError> {
+            let mut capabilities = None;
+            let gpu = Self::open_where(instance, |_, adapter| {
+                let found = surface.get_capabilities(adapter);
+                let fits = adapter.is_surface_supported(surface) && !found.formats.is_empty();
+                capabilities = fits.then_some(found);
+                fits
+            })?;
+            Ok((gpu, capabilities.ok_or(GpuError::NoAdapter)?))
+        }
+
+        fn open_where(
+            instance: &wgpu::Instance,
+            mut fits: impl FnMut(&DeviceInfo, &wgpu::Adapter) -> bool,
+        ) -> Result<Gpu, GpuError> {
+            let (info, adapter) = adapters(instance)
                 .into_iter()
-                .find(|(info, _)| info.is_hardware() || !only_hardware)
+                .find(|(info, adapter)| fits(info, adapter))
                 .ok_or(GpuError::NoAdapter)?;
             let wish = wgpu::DeviceDescriptor {
                 label: Some("jetsam"),
@@ -218,6 +259,9 @@ mod device {
 
         /// Does some work on the device and tells what went wrong on the way. Here wgpu's errors come out, whichever way
         /// they take: error scopes, the callback of a lost device, or a panic where wgpu has no other.
+        ///
+        /// # Errors
+        /// Those of `work`, and what the device says.
         pub fn attempt<T>(&self, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
             use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
             let scopes = [OutOfMemory, Internal, Validation].map(|f| self.device.push_error_scope(f));

@@ -53,3 +53,18 @@ pub struct Ledger {
     /// Particles found with a position that is not finite, since the beginning.
     pub nonfinite: u64,
 }
+
+impl Ledger {
+    /// What was counted since the beginning, and nothing else.
+    pub fn counts(&self) -> Self {
+        Self {
+            left: self.left,
+            born: self.born,
+            drained: self.drained,
+            lost: self.lost,
+            fast_contacts: self.fast_contacts,
+            nonfinite: self.nonfinite,
+            ..Self::default()
+        }
+    }
+}

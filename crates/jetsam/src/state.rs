@@ -102,6 +102,11 @@ impl Particles {
         first..first + self.count[kind as usize]
     }
 
+    /// The first identity that no fluid particle has had, as far as the living show.
+    pub fn next_id(&self) -> u32 {
+        self.id[self.segment(Kind::Fluid)].iter().max().map_or(0, |id| id + 1)
+    }
+
     /// Adds a fluid particle born at `time` (s). Where there is no place left, the segment is enlarged by half: the segments of bodies
     /// move up, and their particles must be copied anew.
     pub fn append(&mut self, record: Record, id: u32, owner: u32, time: f64) {

@@ -1,10 +1,14 @@
 //! A world: constants, state and the step.
 
+mod hand;
+
+pub use hand::{Grip, Mismatch};
+
 use crate::assemble::Assembly;
 use crate::backend::{self, Backend, Batch, Choice, Cpu, Request};
 use crate::error::Result;
 use crate::flock::Order;
-use crate::gpu::GpuError;
+use crate::gpu::{Gpu, GpuError};
 use crate::integrate::Advance;
 use crate::ledger::Ledger;
 use crate::mesh::Mesh;
@@ -27,6 +31,7 @@ pub struct World {
     timers: [Duration; Stage::WCSPH.len()],
     bound_by: Vec<(DtBound, u64)>,
     momentum: MomentumLedger,
+    grip: Option<Grip>,
 }
 
 /// What one step did.
@@ -88,7 +93,19 @@ impl World {
     /// # Errors
     /// A GPU was asked for, and there is none, or it cannot run the scene.
     pub fn choose(choice: Choice, assembly: Assembly) -> std::result::Result<(Self, Option<String>), GpuError> {
-        let (backend, why) = backend::open(choice, &assembly.model)?;
+        Self::choose_with(choice, None, assembly)
+    }
+
+    /// The same on a device that pictures are drawn on too, where a device is chosen.
+    ///
+    /// # Errors
+    /// As [`World::choose`].
+    pub fn choose_with(
+        choice: Choice,
+        shared: Option<&Gpu>,
+        assembly: Assembly,
+    ) -> std::result::Result<(Self, Option<String>), GpuError> {
+        let (backend, why) = backend::open(choice, &assembly.model, shared)?;
         let world = Self::on(backend, assembly);
         match world.fault() {
             None => Ok((world, why)),
@@ -109,11 +126,11 @@ impl World {
             timers: Default::default(),
             bound_by: Vec::new(),
             momentum: MomentumLedger::default(),
+            grip: None,
         };
         world.evaluate();
         world.settle();
-        let ledger = world.backend.ledger();
-        world.momentum = MomentumLedger { start: ledger.momentum, impulse: DVec3::ZERO, force: ledger.external_force };
+        world.begin_ledger();
         world.timers = Default::default();
         world
     }
@@ -125,6 +142,7 @@ impl World {
         }
         let (dt, bound) = self.next_dt(longest);
         let advance = Advance { time: self.time, dt, dt_before: self.dt_before, drag: 0.0 };
+        self.hold(dt);
         for (stage, timer) in Stage::WCSPH.into_iter().zip(&mut self.timers) {
             let start = Instant::now();
             self.backend.run(stage, &self.model, advance);
@@ -184,6 +202,9 @@ impl World {
     /// Steps that the backend makes by itself, at most so long (s) and so many; reports the last.
     fn queue(&mut self, longest: f64, most: usize) -> Option<StepReport> {
         let request = Request { time: self.time, left: longest, dt_before: self.dt_before, drag: 0.0, most };
+        if self.grip.is_some() {
+            return None; // the hand is felt step by step
+        }
         let Batch { steps, stages } = self.backend.queue(&self.model, request)?;
         self.timers.iter_mut().zip(stages).for_each(|(timer, time)| *timer += time);
         let end = self.time + longest;
@@ -238,7 +259,7 @@ impl World {
     /// Runs the stages that evaluate forces.
     fn evaluate(&mut self) {
         for stage in Stage::WCSPH.into_iter().filter(|s| s.evaluates()) {
-            self.backend.run(stage, &self.model, Advance::default());
+            self.backend.run(stage, &self.model, Advance { time: self.time, ..Advance::default() });
         }
     }
 
@@ -262,6 +283,12 @@ impl World {
             self.dt_before = dt;
             time += dt;
         }
+    }
+
+    /// From now on the change of momentum is compared with the impulse from outside.
+    fn begin_ledger(&mut self) {
+        let ledger = self.backend.ledger();
+        self.momentum = MomentumLedger { start: ledger.momentum, impulse: DVec3::ZERO, force: ledger.external_force };
     }
 
     fn record(&mut self, dt: f64, bound: DtBound, ledger: &Ledger) -> StepReport {
@@ -319,6 +346,17 @@ impl World {
     /// Name of the backend.
     pub fn backend(&self) -> &'static str {
         self.backend.name()
+    }
+
+    /// The particles where they are, when they are on a device that pictures can be drawn on.
+    #[cfg(feature = "gpu")]
+    pub fn on_device(&self) -> Option<backend::OnDevice> {
+        self.backend.on_device()
+    }
+
+    /// Bodies and agents alone, where they come home faster than the whole state.
+    pub fn movers(&self) -> Option<(Vec<crate::state::Body>, Vec<Record>)> {
+        self.backend.movers()
     }
 
     /// Name of the device, where it is not the processor.

@@ -10,7 +10,7 @@ mod stats;
 mod video;
 mod vtk;
 
-use crate::args::Save;
+use crate::args::{PictureArgs, Save};
 use jetsam::{Error, FrameStats, Scene, World};
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -35,7 +35,13 @@ pub struct Outputs(Vec<Box<dyn Writer>>);
 
 impl Outputs {
     /// Makes the folder and opens what was asked for in it.
-    pub fn create(folder: &Path, save: &[Save], scene: &Scene, world: &World) -> miette::Result<Self> {
+    pub fn create(
+        folder: &Path,
+        save: &[Save],
+        pictures: &PictureArgs,
+        scene: &Scene,
+        world: &World,
+    ) -> miette::Result<Self> {
         std::fs::create_dir_all(folder).map_err(at(folder))?;
         let wants = |kind| save.contains(&kind);
         let mut all: Vec<Box<dyn Writer>> = vec![Box::new(stats::Stats::create(folder)?)];
@@ -48,8 +54,8 @@ impl Outputs {
                 all.push(Box::new(flocks_csv::FlocksCsv::create(folder)?));
             }
         }
-        if wants(Save::Png) || wants(Save::Mp4) {
-            all.push(Box::new(pictures::Pictures::create(folder, wants(Save::Png), wants(Save::Mp4), scene, world)?));
+        if [Save::Png, Save::Mp4, Save::Apng].into_iter().any(wants) {
+            all.push(Box::new(pictures::Pictures::create(folder, save, pictures, scene, world)?));
         }
         if wants(Save::Ply) {
             all.push(Box::new(particles::Particles::new(folder, "ply", ply::write_particles)));

@@ -38,7 +38,7 @@ impl Video {
             .stdout(Stdio::null())
             .spawn()
             .map_err(|e| {
-                miette!(help = "install ffmpeg and put it on the PATH, or use --save png", "mp4 needs ffmpeg: {e}")
+                miette!(help = "install ffmpeg and put it on the PATH, or use --save apng", "mp4 needs ffmpeg: {e}")
             })?;
         Ok(Self { path, ffmpeg })
     }
@@ -56,6 +56,6 @@ impl Video {
         if status.success() {
             return Ok(());
         }
-        Err(miette!(help = "its own message is above; --save png works without it", "ffmpeg ended with {status}"))
+        Err(miette!(help = "its own message is above; --save apng works without it", "ffmpeg ended with {status}"))
     }
 }

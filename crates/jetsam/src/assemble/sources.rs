@@ -13,6 +13,25 @@ impl Scene {
         self.emitter.iter().enumerate().map(|(index, emitter)| self.source(index, emitter)).collect()
     }
 
+    /// A hose that a hand holds ([`crate::World::pour`]): the scene's first fluid comes out of a disc of `radius` (m) about `center` (m)
+    /// along `axis` at `speed` (m/s), from `time` (s) on.
+    ///
+    /// # Errors
+    /// A scene without fluid, or a hose that begins outside the domain.
+    pub fn hose(&self, center: DVec3, axis: DVec3, radius: f64, speed: f64, time: f64) -> Result<Source> {
+        let (center, axis) = (center.to_array(), axis.to_array());
+        let emitter = Emitter {
+            name: None,
+            fluid: None,
+            outlet: Outlet::Hose { center, axis, radius, speed: Some(speed), rate: None },
+            start: time,
+            stop: None,
+            count: 1e9,
+            jitter: 0.0,
+        };
+        Ok(Source { stream: Source::HAND, ..self.source(self.emitter.len(), &emitter)? })
+    }
+
     fn source(&self, index: usize, emitter: &Emitter) -> Result<Source> {
         let key = format!("emitter.{index}");
         let fluid = match &emitter.fluid {

@@ -107,7 +107,8 @@ impl Backend for Cpu {
 
     fn upload(&mut self, _model: &Model, state: State) {
         let p = &state.particles;
-        self.spare = Spare {
+        let ledger = self.ledger.counts();
+        let spare = Spare {
             record: p.record.clone(),
             id: p.id.clone(),
             owner: p.owner.clone(),
@@ -115,18 +116,27 @@ impl Backend for Cpu {
             rate: p.rate.clone(),
             born: p.born.clone(),
         };
-        self.place = state.bodies.owner.iter().map(|_| AtomicU32::new(0)).collect();
-        self.places = Places::new(p.record.len());
-        self.share = vec![0.0; state.particles.record.len()];
-        self.parts = bodies::parts(&state.bodies.body);
-        self.stirred = state.bodies.body.iter().map(|_| AtomicBool::new(false)).collect();
-        self.particle_mass = state.bodies.body.iter().map(|b| (b.mass / b.slots.len().max(1) as f64) as f32).collect();
-        self.ledger = Ledger::default();
-        self.static_copies = 0;
-        self.next_id = p.count[Kind::Fluid as usize] as u32;
-        let far = |b: &Body| state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max) as f32;
-        self.body_radius = state.bodies.body.iter().map(far).collect();
-        self.state = state;
+        let bodies = &state.bodies;
+        let mass = |b: &Body| (b.mass / b.slots.len().max(1) as f64) as f32;
+        let far = |b: &Body| bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max) as f32;
+        *self = Self {
+            spare,
+            ledger,
+            place: bodies.owner.iter().map(|_| AtomicU32::new(0)).collect(),
+            places: Places::new(p.record.len()),
+            share: vec![0.0; p.record.len()],
+            parts: bodies::parts(&bodies.body),
+            stirred: bodies.body.iter().map(|_| AtomicBool::new(false)).collect(),
+            particle_mass: bodies.body.iter().map(mass).collect(),
+            next_id: p.next_id(),
+            body_radius: bodies.body.iter().map(far).collect(),
+            state,
+            ..Self::default()
+        };
+    }
+
+    fn edit(&mut self, _model: &Model, change: &mut dyn FnMut(&mut State)) {
+        change(&mut self.state);
     }
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {

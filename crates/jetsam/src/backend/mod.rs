@@ -8,12 +8,12 @@ pub use cpu::Cpu;
 #[cfg(feature = "gpu")]
 pub use gpu::OnGpu;
 
-use crate::gpu::GpuError;
+use crate::gpu::{Gpu, GpuError};
 use crate::integrate::Advance;
 use crate::ledger::Ledger;
 use crate::model::{DtBound, Model};
 use crate::stage::Stage;
-use crate::state::State;
+use crate::state::{Body, Record, State};
 use std::time::Duration;
 
 /// A device that runs the stages of a step.
@@ -24,8 +24,21 @@ pub trait Backend: Send {
     fn device(&self) -> Option<String> {
         None
     }
-    /// Takes over a state.
+    /// Takes over a state; what the ledger counts since the beginning goes on.
     fn upload(&mut self, model: &Model, state: State);
+    /// Changes the motion of bodies and agents between two steps.
+    fn edit(&mut self, model: &Model, change: &mut dyn FnMut(&mut State));
+    /// Sources were added, moved or taken away at a time (s).
+    fn sources_changed(&mut self, _model: &Model, _time: f64) {}
+    /// The particles where they are, on a device that pictures can be drawn on.
+    #[cfg(feature = "gpu")]
+    fn on_device(&self) -> Option<OnDevice> {
+        None
+    }
+    /// Bodies and agents alone, where they come home faster than the whole state.
+    fn movers(&self) -> Option<(Vec<Body>, Vec<Record>)> {
+        None
+    }
     /// Runs one stage.
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance);
     /// Runs whole steps without the host between them; nothing where the backend or the scene does not allow that.
@@ -40,6 +53,22 @@ pub trait Backend: Send {
     fn fault(&self) -> Option<&GpuError> {
         None
     }
+}
+
+/// Particles in the memory of a device, as the kernels have them: kind by kind, with gaps between the kinds.
+#[cfg(feature = "gpu")]
+#[derive(Clone, Debug)]
+pub struct OnDevice {
+    /// [`Record`]s.
+    pub record: wgpu::Buffer,
+    /// Acceleration (m/s^2) of fluids, force (N) on bodies' particles, and relative density: four `f32`.
+    pub push: wgpu::Buffer,
+    /// Identity, and index of the fluid or body: two `u32`.
+    pub tag: wgpu::Buffer,
+    /// First particle of each kind.
+    pub first: [u32; 3],
+    /// Particles of each kind.
+    pub count: [u32; 3],
 }
 
 /// Steps that a backend is to make by itself.
@@ -78,15 +107,19 @@ pub enum Choice {
     Gpu,
 }
 
-/// Opens the backend of a choice for a scene, and says why it is not a GPU where `Auto` had to choose.
+/// Opens the backend of a choice for a scene, on a device that is `shared` with others where there is one, and says why it is not a GPU where `Auto` had to choose.
 ///
 /// # Errors
 /// `Gpu` where there is no device, or the scene cannot run on it.
-pub fn open(choice: Choice, model: &Model) -> Result<(Box<dyn Backend>, Option<String>), GpuError> {
+pub fn open(
+    choice: Choice,
+    model: &Model,
+    shared: Option<&Gpu>,
+) -> Result<(Box<dyn Backend>, Option<String>), GpuError> {
     let why = match choice {
         Choice::Cpu => None,
-        Choice::Gpu => return Ok((on_gpu(model, false)?, None)),
-        Choice::Auto => match on_gpu(model, true) {
+        Choice::Gpu => return Ok((on_gpu(model, false, shared)?, None)),
+        Choice::Auto => match on_gpu(model, true, shared) {
             Ok(backend) => return Ok((backend, None)),
             Err(why) => Some(why.to_string()),
         },
@@ -95,14 +128,18 @@ pub fn open(choice: Choice, model: &Model) -> Result<(Box<dyn Backend>, Option<S
 }
 
 #[cfg(feature = "gpu")]
-fn on_gpu(model: &Model, only_hardware: bool) -> Result<Box<dyn Backend>, GpuError> {
+fn on_gpu(model: &Model, only_hardware: bool, shared: Option<&Gpu>) -> Result<Box<dyn Backend>, GpuError> {
     if let Some(what) = gpu::unsupported(model) {
         return Err(GpuError::Scene { what });
     }
-    Ok(Box::new(OnGpu::open(only_hardware)?))
+    match shared {
+        Some(gpu) if only_hardware && !gpu.info.is_hardware() => Err(GpuError::NoAdapter),
+        Some(gpu) => Ok(Box::new(OnGpu::on(gpu.clone()))),
+        None => Ok(Box::new(OnGpu::open(only_hardware)?)),
+    }
 }
 
 #[cfg(not(feature = "gpu"))]
-fn on_gpu(_model: &Model, _only_hardware: bool) -> Result<Box<dyn Backend>, GpuError> {
+fn on_gpu(_model: &Model, _only_hardware: bool, _shared: Option<&Gpu>) -> Result<Box<dyn Backend>, GpuError> {
     Err(GpuError::NotBuilt)
 }

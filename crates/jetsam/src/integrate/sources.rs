@@ -99,6 +99,9 @@ impl Drain {
 }
 
 impl Source {
+    /// Stream of random numbers of the hose that a hand holds.
+    pub const HAND: u64 = u64::MAX;
+
     /// The births in `(from, to]`, and at `from` itself when that is the source's first: numbers of layers or bursts.
     fn births(&self, from: f64, to: f64, first_step: bool) -> Range<u64> {
         let index = |t: f64| if t < self.span[0] { 0 } else { 1 + ((t - self.span[0]) / self.period) as u64 };

@@ -62,6 +62,33 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The scene with other values: `key=value` pairs as for [`Scene::load`]; `key=` without a value takes the key away.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn with(&self, overrides: &[String]) -> Result<Self> {
+        let fault = |e: &toml::ser::Error| self.error("", e.to_string(), "report this");
+        let mut table = Table::try_from(self).map_err(|e| fault(&e))?;
+        for one in overrides {
+            set(&mut table, one).map_err(|(message, help)| self.error("", message, help))?;
+        }
+        let mut scene =
+            Self::deserialize_table(table).map_err(|e| self.error("", e.message().to_owned(), hint(e.message())))?;
+        scene.source = self.source.clone();
+        scene.check_ranges()?;
+        Ok(scene)
+    }
+
+    /// The value at a dotted path, if the scene says one.
+    pub fn value(&self, path: &str) -> Option<Value> {
+        let whole = Value::try_from(self).ok()?;
+        path.split('.').try_fold(whole, |at, part| match at {
+            Value::Table(mut t) => t.remove(part),
+            Value::Array(mut a) => part.parse::<usize>().ok().filter(|i| *i < a.len()).map(|i| a.swap_remove(i)),
+            _ => None,
+        })
+    }
+
     fn deserialize_table(table: Table) -> std::result::Result<Self, toml::de::Error> {
         use serde::Deserialize as _;
         Scene::deserialize(table)
@@ -227,6 +254,9 @@ fn set(table: &mut Table, one: &str) -> std::result::Result<(), (String, String)
         at = step_into(at, part).ok_or((format!("--set {key}: there is no `{part}`"), usage.to_owned()))?;
     }
     match at {
+        Value::Table(t) if text.trim().is_empty() => {
+            t.remove(*last);
+        }
         Value::Table(t) => {
             t.insert((*last).into(), value);
         }

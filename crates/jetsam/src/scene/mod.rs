@@ -11,6 +11,7 @@ pub mod joint;
 mod load;
 pub mod motion;
 mod probe;
+mod save;
 pub mod solid;
 
 pub use crate::formula::Formula;

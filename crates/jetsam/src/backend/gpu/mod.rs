@@ -14,7 +14,7 @@ use crate::integrate::sources::{self, Birth};
 use crate::ledger::Ledger;
 use crate::model::{DtBound, Model};
 use crate::stage::Stage;
-use crate::state::State;
+use crate::state::{Body, Record, State};
 use layout::{Clock, GpuBody, Pose, Sizes, Sums, double};
 use program::{BOUNDS, Kernelet, Over, Program};
 use std::collections::VecDeque;
@@ -46,6 +46,20 @@ pub struct OnGpu {
     /// A drift was made since the last sort.
     drifted: bool,
     fault: Option<GpuError>,
+    flows: Flows,
+}
+
+/// Of the model's sources, what buffers and kernels were made for.
+#[derive(Clone, Copy, Default, PartialEq)]
+struct Flows {
+    any: bool,
+    hoses: usize,
+}
+
+impl Flows {
+    fn of(model: &Model) -> Self {
+        Self { any: !model.sources.is_empty(), hoses: program::hoses(model).count() }
+    }
 }
 
 /// What a scene needs on the device.
@@ -84,8 +98,13 @@ impl OnGpu {
     /// # Errors
     /// [`GpuError`] where there is none.
     pub fn open(only_hardware: bool) -> Result<Self, GpuError> {
-        Ok(Self {
-            gpu: Gpu::open(only_hardware)?,
+        Ok(Self::on(Gpu::open(only_hardware)?))
+    }
+
+    /// On a device that is open already.
+    pub fn on(gpu: Gpu) -> Self {
+        Self {
+            gpu,
             start: State::default(),
             present: OnceLock::new(),
             ready: None,
@@ -95,7 +114,8 @@ impl OnGpu {
             known: 0.0,
             drifted: false,
             fault: None,
-        })
+            flows: Flows::default(),
+        }
     }
 
     /// Its name and how it is reached.
@@ -186,7 +206,8 @@ impl Backend for OnGpu {
 
     fn upload(&mut self, model: &Model, state: State) {
         self.present = OnceLock::new();
-        self.ledger = Ledger::default();
+        self.ledger = self.ledger.counts();
+        self.flows = Flows::of(model);
         self.drifted = false;
         if let Err(fault) = self.prepare(model, &state) {
             self.fault = Some(fault);
@@ -195,11 +216,55 @@ impl Backend for OnGpu {
         (self.coming, self.known) = (VecDeque::new(), 0.0);
         self.write_clock(Clock {
             live,
-            next_id: live,
+            next_id: state.particles.next_id(),
             gravity: layout::single(model.gravity, 0.0),
             ..Clock::default()
         });
         self.start = state;
+    }
+
+    fn edit(&mut self, model: &Model, change: &mut dyn FnMut(&mut State)) {
+        let mut state = self.download().clone();
+        change(&mut state);
+        let (bodies, agents) = (layout::bodies(model, &state, &layout::parts(&state)), layout::agents(model, &state));
+        self.attempt(|gpu, ready| {
+            ready.buffers.write_movers(gpu, &bodies, &agents);
+            Ok(())
+        });
+        self.present = OnceLock::new();
+    }
+
+    fn sources_changed(&mut self, model: &Model, time: f64) {
+        if Flows::of(model) != self.flows {
+            let state = self.download().clone();
+            self.upload(model, state);
+            self.known = time;
+            return;
+        }
+        // what was to come is listed anew
+        (self.coming, self.known) = (VecDeque::new(), time);
+        self.attempt(|gpu, ready| {
+            let constants = layout::constants(model, ready.sizes);
+            gpu.queue.write_buffer(&ready.buffers.all[0], 0, &constants);
+            Ok(())
+        });
+    }
+
+    fn on_device(&self) -> Option<super::OnDevice> {
+        let Ready { buffers, sizes, .. } = self.ready.as_ref()?;
+        let [record, tag, push] = [2, 3, 4].map(|k: usize| buffers.all[k].clone());
+        let first = [0, sizes.fluids, sizes.fluids + sizes.rigid];
+        let count = [self.clock.live, sizes.rigid, sizes.slots - sizes.rigid];
+        Some(super::OnDevice { record, push, tag, first, count })
+    }
+
+    fn movers(&self) -> Option<(Vec<Body>, Vec<Record>)> {
+        let ready = self.ready.as_ref()?;
+        let fetched = self.gpu.attempt(|| ready.buffers.movers(&self.gpu, ready.sizes)).ok()?;
+        let mut bodies = self.start.bodies.body.clone();
+        bodies.iter_mut().zip(&fetched.0).for_each(|(body, from)| layout::to_body(from, body));
+        let record = |a: &layout::Agent| Record { x: layout::three(a.x), v: layout::three(a.v), ..Record::default() };
+        Some((bodies, fetched.1.iter().map(record).collect()))
     }
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {

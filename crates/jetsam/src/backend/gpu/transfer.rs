@@ -239,6 +239,18 @@ impl Buffers {
         Ok(())
     }
 
+    /// Writes bodies and agents anew.
+    pub fn write_movers(&self, gpu: &Gpu, bodies: &[GpuBody], agents: &[Agent]) {
+        gpu.queue.write_buffer(&self.all[11], 0, bytemuck::cast_slice(bodies));
+        gpu.queue.write_buffer(&self.all[25], 0, bytemuck::cast_slice(agents));
+    }
+
+    /// Brings bodies and agents home.
+    pub fn movers(&self, gpu: &Gpu, sizes: Sizes) -> Result<(Vec<GpuBody>, Vec<Agent>), GpuError> {
+        let bodies = self.fetch(gpu, &self.all[11], 0, sizes.bodies as usize)?;
+        Ok((bodies, self.fetch(gpu, &self.all[25], 0, sizes.agents as usize)?))
+    }
+
     /// The clock.
     pub fn clock(&self) -> &wgpu::Buffer {
         &self.all[1]
