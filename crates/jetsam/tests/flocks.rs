@@ -290,6 +290,20 @@ fn couzin_swarms_mill_and_fly_parallel() {
     }
 }
 
+#[test]
+fn agents_begin_all_over_a_shape_made_of_particles() {
+    // spread evenly, places have no memory of the lattice of particles: the mean of exp(2 pi i x / spacing) is 1 / sqrt(n) in size
+    let shape = "shape = { torus = { center = [10, 10, 10], axis = [1, 2, 1], radius = 6, tube = 3 } }";
+    let n = 4000;
+    let w = world(&sky(3, "open", 20.0, &format!("[[flock]]\ncount = {n}\nradius = 1\nspeed = 1\n{shape}\n")));
+    for axis in 0..3 {
+        let angles = agents(&w).into_iter().map(|r| std::f32::consts::TAU * r.x[axis]);
+        let (s, c) = angles.fold((0.0, 0.0), |(s, c), a| (s + a.sin(), c + a.cos()));
+        let mean = s.hypot(c) / n as f32;
+        assert!(mean < 4.0 / (n as f32).sqrt(), "axis {axis}: {mean}");
+    }
+}
+
 /// Shapes of obstacles in a box of four metres: centre, and half extents of a box or the radius of a ball.
 const BOX: ([f32; 3], [f32; 3]) = ([1.5, 2.0, 1.0], [0.3, 0.4, 1.0]);
 const BALL: ([f32; 3], f32) = ([2.8, 2.2, 2.0], 0.5);

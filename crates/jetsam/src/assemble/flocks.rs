@@ -8,7 +8,8 @@ use crate::interact::cells::Grid;
 use crate::random::uniform;
 use crate::scene::{Flock, FlockModel, Region, Relation, Scene, Shape, Wall};
 use crate::state::{Agents, Clock, Record};
-use glam::DVec3;
+use glam::{DVec3, IVec3};
+use std::collections::HashSet;
 
 /// Random numbers: purpose of a stream. Decisions have the streams below.
 const PLACE: u64 = 100;
@@ -279,9 +280,12 @@ impl Scene {
                 let points = self.solid(shape, key)?.points;
                 let (min, max) =
                     points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
-                let mut near = Near::new(0.5 * dx);
-                points.iter().for_each(|&p| near.insert(p));
-                Space { min, max, inside: Box::new(move |p| near.has(p, None)) }
+                // whole cubes about the points, which are a lattice
+                let base = points.first().copied().unwrap_or_default();
+                let cube = move |p: DVec3| ((p - base) / dx).round().as_ivec3();
+                let filled: HashSet<IVec3> = points.iter().map(|&p| cube(p)).collect();
+                let half = DVec3::splat(0.5 * dx);
+                Space { min: min - half, max: max + half, inside: Box::new(move |p| filled.contains(&cube(p))) }
             }
         };
         let size = space.max - space.min;
