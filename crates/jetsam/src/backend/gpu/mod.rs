@@ -66,6 +66,9 @@ struct Timers {
 
 /// Why a scene cannot run on a GPU yet, in words.
 pub fn unsupported(model: &Model) -> Option<&'static str> {
+    if model.implicit() {
+        return Some("implicit pressure (solver.pressure = \"dfsph\" or \"pbf\")");
+    }
     if !model.joints.is_empty() {
         return Some("joints");
     }
@@ -463,6 +466,7 @@ fn to_ledger(s: &Sums, before: &Ledger) -> Ledger {
         rigid_lost: rigid_lost as usize,
         fast_contacts: before.fast_contacts + u64::from(fast),
         nonfinite: before.nonfinite + u64::from(nonfinite),
+        ..Ledger::default()
     }
 }
 
