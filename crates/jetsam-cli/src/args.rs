@@ -354,6 +354,12 @@ pub struct Bench {
     /// Choose the spacing so that there are about this many fluid particles; may be repeated.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     pub particles: Vec<u64>,
+    /// Compare the solvers of pressure: speed beside density error, for a dam break and for monkey-splash or a scene given.
+    #[arg(long, conflicts_with_all = ["list", "particles", "steps"])]
+    pub solvers: bool,
+    /// With --solvers: simulate so long, in place of what is usual for the scene (s).
+    #[arg(long, requires = "solvers", value_parser = not_negative)]
+    pub seconds: Option<f64>,
     /// What computes.
     #[arg(long, value_enum, default_value_t)]
     pub backend: Backend,

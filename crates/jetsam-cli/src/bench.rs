@@ -40,6 +40,9 @@ struct Case {
 
 /// Measures scene after scene, size after size.
 pub fn bench(args: &args::Bench) -> miette::Result<Outcome> {
+    if args.solvers {
+        return crate::solvers::table(args);
+    }
     let names = match &args.scene {
         Some(scene) => vec![scene.as_str()],
         None => SCENES.iter().map(|s| s.name).collect(),

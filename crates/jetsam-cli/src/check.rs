@@ -3,6 +3,7 @@
 use crate::terminal::{print, print_json, seconds, table};
 use crate::{Outcome, args};
 use jetsam::model::{DtBound, Model};
+use jetsam::scene::Pressure;
 use jetsam::state::Kind;
 use jetsam::{Scene, World};
 use serde::Serialize;
@@ -23,6 +24,9 @@ struct Findings {
     static_bodies: usize,
     agents: usize,
     neighbours: f64,
+    pressure: Pressure,
+    /// Whether the scene left the choice of it open.
+    pressure_auto: bool,
     seconds: f64,
     dt: f64,
     dt_bound: DtBound,
@@ -83,6 +87,8 @@ fn find(name: &str, scene: &Scene, world: &World) -> Findings {
         static_bodies,
         agents: world.state().agents.record.len(),
         neighbours: ledger.neighbours,
+        pressure: model.solver.pressure,
+        pressure_auto: scene.solver.pressure == Pressure::Auto,
         seconds: scene.run.seconds,
         dt,
         dt_bound,
@@ -106,18 +112,32 @@ fn margins(model: &Model, dt: f64, acceleration: f64) -> Vec<Margin> {
     if !model.fluids.is_empty() {
         let s = &model.solver;
         let viscosity = model.fluids.iter().map(|f| f64::from(f.viscosity / f.density)).fold(0.0, f64::max);
-        add("acoustic", dt * (model.sound_speed + model.largest_speed) / h, s.courant, "dt (c_0 + v) / h");
-        add("force", dt * (acceleration / h).sqrt(), s.courant_force, "dt sqrt(a / h)");
+        if !model.implicit() {
+            add("acoustic", dt * (model.sound_speed + model.largest_speed) / h, s.courant, "dt (c_0 + v) / h");
+            add("force", dt * (acceleration / h).sqrt(), s.courant_force, "dt sqrt(a / h)");
+            add("mach", model.largest_speed / model.sound_speed, 0.1, "v / c_0; above it density errors exceed 1 %");
+        }
         add("viscous", dt * viscosity / (h * h), s.courant_viscous, "dt nu / h^2");
-        add("mach", model.largest_speed / model.sound_speed, 0.1, "v / c_0; above it density errors exceed 1 %");
     }
     let shortest = (0..model.contacts.len())
         .map(|b| model.contact_time(b, model.contacts[b].shared_by))
         .fold(f64::INFINITY, f64::min);
-    if shortest.is_finite() {
+    if shortest.is_finite() && !model.implicit() {
         add("contact", PI * dt / shortest, 2.0, "omega dt");
     }
     all
+}
+
+/// How pressure is found, and why so.
+fn solver(f: &Findings) -> String {
+    let (name, what) = match f.pressure {
+        Pressure::Dfsph => ("dfsph", "implicit, steps bound by the flow"),
+        Pressure::Pbf => ("pbf", "implicit, steps bound by the flow"),
+        Pressure::Wcsph | Pressure::Auto => ("wcsph", "weakly compressible, steps bound by sound"),
+    };
+    let why =
+        if f.pressure_auto { "; auto: validated throughout, for measuring; dfsph and pbf are faster" } else { "" };
+    format!("{name} ({what}{why})")
 }
 
 fn describe(f: &Findings) -> String {
@@ -127,6 +147,7 @@ fn describe(f: &Findings) -> String {
         ("bodies", format!("{} rigid, {} static", f.bodies, f.static_bodies)),
         ("agents", f.agents.to_string()),
         ("spacing", format!("{} m, support {} m, {:.1} neighbours", f.spacing, f.support, f.neighbours)),
+        ("pressure", solver(f)),
         (
             "time step",
             format!("{}, bounded by {}; {} steps for {} s", seconds(f.dt), f.dt_bound.name(), f.steps, f.seconds),

@@ -12,6 +12,7 @@ mod run;
 mod scenes;
 mod schema;
 mod shell;
+mod solvers;
 mod terminal;
 mod validate;
 mod view;

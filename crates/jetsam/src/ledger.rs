@@ -25,6 +25,16 @@ pub struct Ledger {
     pub total_force: DVec3,
     /// Sum of the magnitudes of the forces on fluids' and bodies' particles (N).
     pub force_scale: f64,
+    /// How implicit pressure was found in the last step (E9).
+    pub pressure: Solve,
+    /// How velocities were made free of compression (E9, DFSPH).
+    pub divergence: Solve,
+    /// The speed that pressure could give: `sqrt(p / rho)` of the root mean square of pressures, times `3^(1/4)`, which is the largest in a
+    /// tank at rest (m/s); 0 with WCSPH.
+    pub pressed: f64,
+    /// Times implicit pressure did not keep a fluid particle out of a solid side of the domain, so that it was put back, since the
+    /// beginning.
+    pub put_back: u64,
     /// Kinetic energy (J).
     pub kinetic: f64,
     /// Potential energy in the gravity vector, zero at the domain's lower corner (J).
@@ -64,7 +74,17 @@ impl Ledger {
             lost: self.lost,
             fast_contacts: self.fast_contacts,
             nonfinite: self.nonfinite,
+            put_back: self.put_back,
             ..Self::default()
         }
     }
+}
+
+/// How the iterations of a solve went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Solve {
+    /// Rounds made.
+    pub iterations: u32,
+    /// Mean compression left, as a fraction of the rest density: of densities, or what velocities bring in a step.
+    pub residual: f64,
 }

@@ -4,9 +4,10 @@ use crate::flock::FlockConstants;
 use crate::integrate::sources::{Drain, Source};
 use crate::interact::cells::Grid;
 use crate::laws::kernel::{Kernel, KernelSet};
+use crate::ledger::Ledger;
 use crate::scene::joint::JointModel;
 use crate::scene::motion::{Path, Shake};
-use crate::scene::{Density, Force, Solver, Viscosity};
+use crate::scene::{Density, Force, Pressure, Solver, Viscosity};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -200,6 +201,10 @@ pub struct ContactModel {
 pub enum DtBound {
     /// Sound and flow crossing half a support.
     Sound,
+    /// The fastest particle moves a fraction of a spacing.
+    Flow,
+    /// The longest step allowed.
+    Longest,
     /// Largest acceleration.
     Force,
     /// Viscosity.
@@ -221,6 +226,8 @@ impl DtBound {
     pub fn name(self) -> &'static str {
         match self {
             DtBound::Sound => "sound",
+            DtBound::Flow => "flow",
+            DtBound::Longest => "longest",
             DtBound::Force => "force",
             DtBound::Viscosity => "viscosity",
             DtBound::Contact => "contact",
@@ -231,6 +238,13 @@ impl DtBound {
         }
     }
 }
+
+/// A body moves no further between two looks at contacts than this fraction of the contact diameter: contacts see it coming.
+pub const TRAVEL: f64 = 0.1;
+/// Spacings that a particle pressed by its neighbours may swing in a step of DFSPH; a tank at rest is stable up to 0.6.
+const SWING: f64 = 0.35;
+/// No step is cut into more steps of bodies than this.
+const MOST_SUBSTEPS: f64 = 1000.0;
 
 /// Tangential over normal spring of a contact: both then last equally long for a ball (Schaefer, Dippel and Wolf 1996).
 pub(crate) const TANGENTIAL: f32 = 2.0 / 7.0;
@@ -247,6 +261,17 @@ impl Model {
             && s.shifting == 0.0
             && s.vorticity == 0.0
             && self.fluids.iter().all(|f| f.cohesion == 0.0 && f.curvature == 0.0)
+    }
+
+    /// Whether pressure is implicit (E9): found by iteration, in steps that the flow bounds.
+    pub fn implicit(&self) -> bool {
+        matches!(self.solver.pressure, Pressure::Dfsph | Pressure::Pbf)
+    }
+
+    /// Pressure up to which gravity fades out between fluids and bodies (Pa; E17): that of a support's depth.
+    pub fn hold_limit(&self) -> f32 {
+        let rho = self.fluids.iter().map(|f| f.density).fold(0.0, f32::max);
+        (rho * (self.gravity.length() * self.support) as f32).max(1e-9)
     }
 
     /// How far contacts are looked for (m).
@@ -311,6 +336,15 @@ impl Model {
         let k_t = TANGENTIAL * k;
         let eta_t = part * crate::laws::contact::dashpot(TANGENTIAL_DAMPING, k_t / part * n, mass) / n;
         (k_t, eta_t, mu)
+    }
+
+    /// In how many steps of bodies a step of `dt` (s) is to be cut for contacts, while the fastest particle of a body moves at
+    /// `body_speed` (m/s).
+    pub fn substeps(&self, dt: f64, body_speed: f64) -> u32 {
+        let contact = self.dt_bounds.iter().filter(|b| b.0 == DtBound::Contact).map(|b| b.1);
+        let longest = contact.fold(TRAVEL * self.contact_diameter / body_speed, f64::min);
+        let parts = (dt / longest - 1e-9).ceil();
+        if parts.is_finite() { parts.clamp(1.0, MOST_SUBSTEPS) as u32 } else { 1 }
     }
 
     /// Whether colour gradients or vorticities are wanted (E7, E8).
@@ -420,14 +454,42 @@ impl Model {
         self.flocks = flocks;
     }
 
+    /// Spacings that the fastest particle moves in a step of implicit pressure (E29).
+    fn courant_flow(&self) -> f64 {
+        self.solver.courant_flow.unwrap_or(if self.solver.pressure == Pressure::Pbf { 1.0 } else { 0.6 })
+    }
+
+    /// The speed by which steps are bound (m/s): that of the fastest particle. With DFSPH, which holds the directions of pairs for
+    /// a step, also that with which pressed particles swing about their places: `dt sqrt(p / rho) <= 0.35 dx`.
+    pub fn bounding_speed(&self, ledger: &Ledger) -> f64 {
+        match self.solver.pressure {
+            Pressure::Dfsph => ledger.speed.max(self.courant_flow() / SWING * ledger.pressed),
+            _ => ledger.speed,
+        }
+    }
+
     /// Largest time step allowed now and what bounds it (E29), from the largest speed (m/s) and acceleration (m/s^2).
     pub fn largest_dt(&self, speed: f64, acceleration: f64) -> (f64, DtBound) {
         let s = &self.solver;
-        if let Some(dt) = s.dt {
-            return (dt, DtBound::Scene);
-        }
-        let mut best = (f64::INFINITY, DtBound::Frame);
-        if !self.fluids.is_empty() {
+        let mut best = match s.dt {
+            // implicit pressure bears no more than the flow does: there a stated step is the longest
+            Some(dt) if !self.implicit() => return (dt, DtBound::Scene),
+            Some(dt) => (dt, DtBound::Scene),
+            None => (f64::INFINITY, DtBound::Frame),
+        };
+        if self.implicit() {
+            let longest = if s.pressure == Pressure::Pbf { 1.0 / 120.0 } else { 1.0 / 200.0 };
+            let longest = s.longest_dt.unwrap_or(longest);
+            if longest < best.0 {
+                best = (longest, DtBound::Longest);
+            }
+            // so far the fastest gets in a step, by what it has and what pulls it
+            let way = self.courant_flow() * self.spacing;
+            let flow = 2.0 * way / (speed + (speed * speed + 4.0 * acceleration * way).sqrt());
+            if flow < best.0 {
+                best = (flow, DtBound::Flow);
+            }
+        } else if !self.fluids.is_empty() {
             let sound = s.courant * self.support / (2.0 * (self.sound_speed + speed));
             let force = s.courant_force * (self.support / (2.0 * acceleration)).sqrt();
             for bound in [(sound, DtBound::Sound), (force, DtBound::Force)] {
@@ -437,7 +499,8 @@ impl Model {
             }
         }
         for &(bound, dt) in &self.dt_bounds {
-            if dt < best.0 {
+            let inside = self.implicit() && bound == DtBound::Contact; // contacts have steps of their own
+            if dt < best.0 && !inside {
                 best = (dt, bound);
             }
         }

@@ -57,6 +57,11 @@ params! {
     courant: "solver.courant", "1", 0.4, 1e-3, 1.0;
     courant_force: "solver.courant_force", "1", 0.25, 1e-3, 1.0;
     courant_viscous: "solver.courant_viscous", "1", 0.125, 1e-3, 1.0;
+    courant_flow: "solver.courant_flow", "1", _, 1e-3, 4.0;
+    longest_dt: "solver.longest_dt", "s", _, 1e-9, 1.0;
+    tolerance: "solver.tolerance", "1", 0.001, 1e-6, 0.5;
+    divergence_tolerance: "solver.divergence_tolerance", "1", 0.0001, 1e-6, 0.5;
+    iterations: "solver.iterations", "1", 100.0, 1.0, 10000.0;
     contact_overlap: "solver.contact_overlap", "dx", 0.5, 1e-4, 1.0;
     contact_diameter: "solver.contact_diameter", "dx", 1.0, 0.1, 1.5;
     sleep: "solver.sleep", "s", 0.5, 0.0, 1e9;

@@ -97,7 +97,8 @@ impl Recorder {
     pub fn frame(&mut self, world: &World, wall: Duration) -> FrameStats {
         let ledger = world.ledger();
         let (steps, seconds) = (world.steps() - self.steps, world.time() - self.time);
-        let (mut dt, mut dt_bound) = world.model().largest_dt(ledger.speed, ledger.acceleration);
+        let (mut dt, mut dt_bound) =
+            world.model().largest_dt(world.model().bounding_speed(ledger), ledger.acceleration);
         if steps > 0 {
             (dt, dt_bound) = (seconds / steps as f64, most(world.bounds(), &self.bounds).unwrap_or(dt_bound));
         }
@@ -136,7 +137,7 @@ impl Recorder {
 
     /// The run so far.
     pub fn summary(&self, world: &World) -> Summary {
-        let ledger = world.ledger();
+        let (ledger, solves, steps) = (world.ledger(), world.solves(), world.steps().max(1) as f64);
         Summary {
             frames: self.frames,
             time: world.time(),
@@ -151,9 +152,14 @@ impl Recorder {
             lost: ledger.lost + ledger.rigid_lost as u64,
             fast_contacts: ledger.fast_contacts,
             nonfinite: ledger.nonfinite,
+            put_back: ledger.put_back,
             density_error_mean: self.density_error_sum / self.frames.max(1) as f64,
             density_error_max: self.density_error_max,
             momentum_residual: self.momentum_residual,
+            pressure_iterations: solves.pressure as f64 / steps,
+            pressure_residual: solves.pressure_residual / steps,
+            divergence_iterations: solves.divergence as f64 / steps,
+            divergence_residual: solves.divergence_residual / steps,
             wall_s: self.wall.as_secs_f64(),
             real_time_factor: factor(world.time(), self.wall),
             state_hash: format!("{:016x}", state_hash(world.state())),
@@ -190,12 +196,22 @@ pub struct Summary {
     pub fast_contacts: u64,
     /// As in [`FrameStats`].
     pub nonfinite: u64,
+    /// Times implicit pressure did not keep a fluid particle out of a solid side of the domain, so that it was put back.
+    pub put_back: u64,
     /// Mean over the frames of their mean density error.
     pub density_error_mean: f64,
     /// Largest density error at the end of any frame.
     pub density_error_max: f64,
     /// Largest momentum residual at the end of any frame.
     pub momentum_residual: f64,
+    /// Mean number of rounds a step in which implicit pressure corrected places (E9); 0 with WCSPH.
+    pub pressure_iterations: f64,
+    /// Mean compression these left.
+    pub pressure_residual: f64,
+    /// Mean number of rounds a step in which velocities were made free of compression (E9, DFSPH).
+    pub divergence_iterations: f64,
+    /// Mean compression a step that these left in velocities.
+    pub divergence_residual: f64,
     /// Wall-clock time the steps took (s).
     pub wall_s: f64,
     /// Simulated time over that wall-clock time.

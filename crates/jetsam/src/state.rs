@@ -36,7 +36,7 @@ pub struct Record {
     pub volume: f32,
     /// Velocity (m/s): predicted to the step's end between drift and kick. Written by drift and kick.
     pub v: [f32; 3],
-    /// Pressure share `p / D^2` (Pa). Written by pressure (fluid) and boundary (bodies).
+    /// Pressure share `p / D^2` (Pa). Written by pressure (fluid; DFSPH: by divergence) and boundary (bodies; 0 with implicit pressure).
     pub share: f32,
 }
 

@@ -12,7 +12,7 @@ use crate::gpu::{Gpu, GpuError};
 use crate::integrate::Advance;
 use crate::ledger::Ledger;
 use crate::mesh::Mesh;
-use crate::model::{DtBound, Model};
+use crate::model::{DtBound, Model, TRAVEL};
 use crate::scene::Scene;
 use crate::stage::Stage;
 use crate::state::{Kind, Record, State};
@@ -28,10 +28,24 @@ pub struct World {
     time: f64,
     steps: u64,
     dt_before: f64,
-    timers: [Duration; Stage::WCSPH.len()],
+    timers: [Duration; Stage::COUNT],
     bound_by: Vec<(DtBound, u64)>,
     momentum: MomentumLedger,
     grip: Option<Grip>,
+    solves: Solves,
+}
+
+/// How implicit pressure was found (E9), summed over steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Solves {
+    /// Rounds for places.
+    pub pressure: u64,
+    /// Sum of the residuals of places.
+    pub pressure_residual: f64,
+    /// Rounds for velocities (DFSPH).
+    pub divergence: u64,
+    /// Sum of the residuals of velocities.
+    pub divergence_residual: f64,
 }
 
 /// What one step did.
@@ -61,9 +75,6 @@ pub enum Trouble {
 
 /// A step shorter than this fraction of the step at rest means that time stands still.
 const STALLED: f64 = 1e-4;
-
-/// A body moves no further in a step than this fraction of the contact diameter: contacts see it coming.
-pub(crate) const TRAVEL: f64 = 0.1;
 
 /// Momentum against the impulse from outside (E12, C9): what is missing is the residual.
 #[derive(Clone, Copy, Debug, Default)]
@@ -127,6 +138,7 @@ impl World {
             bound_by: Vec::new(),
             momentum: MomentumLedger::default(),
             grip: None,
+            solves: Solves::default(),
         };
         world.evaluate();
         world.settle();
@@ -141,12 +153,12 @@ impl World {
             return report;
         }
         let (dt, bound) = self.next_dt(longest);
-        let advance = Advance { time: self.time, dt, dt_before: self.dt_before, drag: 0.0 };
         self.hold(dt);
-        for (stage, timer) in Stage::WCSPH.into_iter().zip(&mut self.timers) {
+        let advance = Advance { time: self.time, dt, dt_before: self.dt_before, drag: 0.0, parts: self.parts(dt) };
+        for &stage in self.order() {
             let start = Instant::now();
             self.backend.run(stage, &self.model, advance);
-            *timer += start.elapsed();
+            self.timers[stage as usize] += start.elapsed();
         }
         self.dt_before = dt;
         self.time += dt;
@@ -206,7 +218,7 @@ impl World {
             return None; // the hand is felt step by step
         }
         let Batch { steps, stages } = self.backend.queue(&self.model, request)?;
-        self.timers.iter_mut().zip(stages).for_each(|(timer, time)| *timer += time);
+        Stage::WCSPH.into_iter().zip(stages).for_each(|(stage, time)| self.timers[stage as usize] += time);
         let end = self.time + longest;
         let mut last = None;
         for (dt, bound, ledger) in steps {
@@ -227,9 +239,9 @@ impl World {
     /// Length of the next step and what bounds it (E29).
     fn next_dt(&self, longest: f64) -> (f64, DtBound) {
         let ledger = self.backend.ledger();
-        let (mut dt, mut bound) = self.model.largest_dt(ledger.speed, ledger.acceleration);
+        let (mut dt, mut bound) = self.model.largest_dt(self.model.bounding_speed(ledger), ledger.acceleration);
         let travel = TRAVEL * self.model.contact_diameter / ledger.body_speed;
-        if travel < dt && self.model.solver.dt.is_none() {
+        if travel < dt && self.model.solver.dt.is_none() && !self.model.implicit() {
             (dt, bound) = (travel, DtBound::Travel);
         }
         let (longest, end) = self.next_end(longest);
@@ -256,9 +268,20 @@ impl World {
         }
     }
 
+    /// The stages of a step, in their order.
+    fn order(&self) -> &'static [Stage] {
+        Stage::order(self.model.solver.pressure)
+    }
+
+    /// In how many parts bodies make a step of `dt`.
+    fn parts(&self, dt: f64) -> u32 {
+        if self.model.implicit() { self.model.substeps(dt, self.backend.ledger().body_speed) } else { 1 }
+    }
+
     /// Runs the stages that evaluate forces.
     fn evaluate(&mut self) {
-        for stage in Stage::WCSPH.into_iter().filter(|s| s.evaluates()) {
+        let solver = self.model.solver.pressure;
+        for &stage in self.order().iter().filter(|s| s.evaluates(solver)) {
             self.backend.run(stage, &self.model, Advance { time: self.time, ..Advance::default() });
         }
     }
@@ -276,8 +299,8 @@ impl World {
         let mut time = 0.0;
         while time < end {
             let (dt, _) = self.next_dt(end - time);
-            let advance = Advance { time: 0.0, dt, dt_before: self.dt_before, drag };
-            for stage in Stage::WCSPH {
+            let advance = Advance { time: 0.0, dt, dt_before: self.dt_before, drag, parts: 1 };
+            for &stage in self.order() {
                 self.backend.run(stage, &self.model, advance);
             }
             self.dt_before = dt;
@@ -296,9 +319,15 @@ impl World {
             Some((_, n)) => *n += 1,
             None => self.bound_by.push((bound, 1)),
         }
-        self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force);
+        if !self.model.implicit() {
+            self.momentum.impulse += 0.5 * dt * (self.momentum.force + ledger.external_force);
+        }
         self.momentum.impulse += ledger.crossed + ledger.external_impulse;
         self.momentum.force = ledger.external_force;
+        self.solves.pressure += u64::from(ledger.pressure.iterations);
+        self.solves.pressure_residual += ledger.pressure.residual;
+        self.solves.divergence += u64::from(ledger.divergence.iterations);
+        self.solves.divergence_residual += ledger.divergence.residual;
         let (at_rest, _) = self.model.largest_dt(0.0, 0.0);
         let trouble = if self.backend.fault().is_some() {
             Some(Trouble::Device)
@@ -386,7 +415,12 @@ impl World {
 
     /// Wall-clock time spent in each stage since the beginning.
     pub fn timers(&self) -> impl Iterator<Item = (Stage, Duration)> + '_ {
-        Stage::WCSPH.into_iter().zip(self.timers)
+        self.order().iter().map(|&stage| (stage, self.timers[stage as usize]))
+    }
+
+    /// How implicit pressure was found so far.
+    pub fn solves(&self) -> Solves {
+        self.solves
     }
 
     /// What bounded the steps so far, and how often.

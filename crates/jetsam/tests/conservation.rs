@@ -82,17 +82,23 @@ fn momentum_is_impulse_with_gravity_and_walls() {
 
 #[test]
 fn the_same_bits_for_any_number_of_threads() {
+    for (solver, steps) in [("wcsph", 300), ("dfsph", 60), ("pbf", 60)] {
+        same_bits(solver, steps);
+    }
+}
+
+fn same_bits(solver: &str, steps: usize) {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut w = world(
+            let mut w = world(&format!(
                 "[domain]\nmin = [0, 0, 0]\nmax = [0.6, 0.3, 0.6]\n[resolution]\nspacing = 0.025\n\
-                 [solver]\nxsph = 0.1\n\
-                 [[fluid]]\nshape = { box = { min = [0, 0, 0], max = [0.3, 0.3, 0.3] } }\n\
-                 [[rigid]]\nshape = { box = { min = [-0.05, -0.05, -0.05], max = [0.05, 0.05, 0.05] } }\ndensity = 500\n\
-                 position = [0.1, 0.1, 0.42]\ncopies = { count = 4, grid = { columns = [4, 1], step = [0.13, 0, 0] }, tumble = true }\n",
-            );
-            for _ in 0..300 {
+                 [solver]\nxsph = 0.1\npressure = \"{solver}\"\n\
+                 [[fluid]]\nshape = {{ box = {{ min = [0, 0, 0], max = [0.3, 0.3, 0.3] }} }}\n\
+                 [[rigid]]\nshape = {{ box = {{ min = [-0.05, -0.05, -0.05], max = [0.05, 0.05, 0.05] }} }}\ndensity = 500\n\
+                 position = [0.1, 0.1, 0.42]\ncopies = {{ count = 4, grid = {{ columns = [4, 1], step = [0.13, 0, 0] }}, tumble = true }}\n"
+            ));
+            for _ in 0..steps {
                 w.step(f64::INFINITY);
             }
             let s = w.state();
@@ -115,7 +121,7 @@ fn the_same_bits_for_any_number_of_threads() {
     };
     let one = run(1);
     for threads in [2, 4] {
-        assert!(one == run(threads), "{threads} threads give other bits");
+        assert!(one == run(threads), "{solver}: {threads} threads give other bits");
     }
 }
 

@@ -11,6 +11,7 @@ use jetsam::assemble::Assembly;
 use jetsam::backend::{Backend, Choice, Cpu, OnGpu};
 use jetsam::gpu::devices;
 use jetsam::integrate::{Advance, bodies::follow};
+use jetsam::scene::Pressure;
 use jetsam::stage::Stage;
 use jetsam::state::{Kind, State};
 use jetsam::{Scene, Trouble, World, state_hash};
@@ -243,9 +244,9 @@ fn stages_agree(text: &str, before: usize) {
     gpu.upload(&model, start);
     // both begin by evaluating forces where they stand; then the step
     let rest = Advance { time: world.time(), ..Advance::default() };
-    let step = Advance { time: world.time(), dt, dt_before: dt, drag: 0.0 };
+    let step = Advance { time: world.time(), dt, dt_before: dt, drag: 0.0, parts: 1 };
     for (advance, evaluates) in [(rest, true), (step, false)] {
-        for stage in Stage::WCSPH.into_iter().filter(|s| !evaluates || s.evaluates()) {
+        for stage in Stage::WCSPH.into_iter().filter(|s| !evaluates || s.evaluates(Pressure::Wcsph)) {
             cpu.run(stage, &model, advance);
             gpu.run(stage, &model, advance);
             assert!(gpu.fault().is_none(), "{:?}", gpu.fault());

@@ -9,7 +9,7 @@ use crate::model::{
     ContactModel, DtBound, Factors, FluidModel, Model, cohesion_moment, cohesion_pressure, curvature_moment,
 };
 use crate::scene::joint::{JointKind, JointModel};
-use crate::scene::{Coupling, EquationOfState, Force, Scene, Start};
+use crate::scene::{Coupling, Density, EquationOfState, Force, Pressure, PressureForce, Scene, Solver, Start};
 use glam::DVec3;
 
 /// Reynolds number of a spacing below which walls show a mirrored velocity to viscosity: above, the layer that does not slip
@@ -145,7 +145,7 @@ impl Scene {
             paths: bodies.iter().map(|b| b.path.clone()).collect(),
             grid,
             contact_diameter: self.solver.contact_diameter * spacing,
-            solver: self.solver.clone(),
+            solver: Solver { pressure: self.pressure_solver()?, ..self.solver.clone() },
             dt_bounds: Vec::new(),
             no_slip: !self.solver.walls_slip
                 && self.fluid.iter().any(|f| f.density * largest_speed * spacing < NO_SLIP_BELOW * f.viscosity),
@@ -158,6 +158,32 @@ impl Scene {
         };
         model.dt_bounds = self.dt_bounds(&model);
         Ok((model, fluid))
+    }
+
+    /// The solver of pressure that the scene asks for.
+    fn pressure_solver(&self) -> Result<Pressure> {
+        let s = &self.solver;
+        let chosen = match s.pressure {
+            Pressure::Auto => Pressure::Wcsph,
+            stated => stated,
+        };
+        if chosen == Pressure::Wcsph {
+            return Ok(chosen);
+        }
+        let only = |what: &str, key: &str| {
+            let message = format!("{what} goes with pressure = \"wcsph\" alone");
+            self.error(key, message, "leave it out, or state pressure = \"wcsph\"")
+        };
+        if s.density == Density::Continuity {
+            return Err(only("density = \"continuity\"", "solver.density"));
+        }
+        if s.pressure_force == PressureForce::Mueller {
+            return Err(only("pressure_force = \"mueller\"", "solver.pressure_force"));
+        }
+        if s.negative_pressure {
+            return Err(only("negative_pressure", "solver.negative_pressure"));
+        }
+        Ok(chosen)
     }
 
     /// Bodies that a body does not touch, for a joint holds them together.
@@ -239,7 +265,7 @@ impl Scene {
     /// Squeezes fluids that start hydrostatic: the equation of state then holds up what stands above.
     fn squeeze(&self, fluid: &mut [Drop], gravity: DVec3, sound_speed: f64) {
         let g = gravity.length();
-        if g == 0.0 {
+        if g == 0.0 || matches!(self.solver.pressure, Pressure::Dfsph | Pressure::Pbf) {
             return;
         }
         let up = -gravity / g;

@@ -3,6 +3,9 @@
 //! Work is cut into chunks of fixed size whose results do not depend on who computes them, and sums over chunks
 //! are made in their order: the same bits for any number of threads.
 
+mod implicit;
+mod parts;
+
 use super::Backend;
 use crate::flock::{Crowd, Surroundings};
 use crate::integrate::sleep::{self, Rest};
@@ -13,11 +16,12 @@ use crate::interact::neighbours::{Around, NeighbourChunk, Places, with_scratch};
 use crate::interact::{CHUNK, boundary, density, forces, gradients, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
-use crate::scene::Density;
+use crate::scene::{Density, Pressure};
 use crate::stage::Stage;
 use crate::state::{Body, Kind, Record, State, Touch};
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
+use implicit::Implicit;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
@@ -56,6 +60,10 @@ pub struct Cpu {
     crowd: Crowd,
     /// Radius of each body about its centre of mass (m).
     body_radius: Vec<f32>,
+    implicit: Implicit,
+    /// Force from outside (N) on fluids and on bodies at the last evaluation, for the ledger of implicit solvers.
+    outside_fluids: DVec3,
+    outside_bodies: DVec3,
 }
 
 /// Arrays that `cells` writes while it reads their twins.
@@ -96,6 +104,9 @@ impl Default for Cpu {
             held: DVec3::ZERO,
             crowd: Crowd::default(),
             body_radius: Vec::new(),
+            implicit: Implicit::default(),
+            outside_fluids: DVec3::ZERO,
+            outside_bodies: DVec3::ZERO,
         }
     }
 }
@@ -140,7 +151,14 @@ impl Backend for Cpu {
     }
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
+        let solver = model.solver.pressure;
         match stage {
+            Stage::Drift if model.implicit() => self.glide(model, advance),
+            Stage::Kick if model.implicit() => self.push(advance),
+            Stage::Bodies if model.implicit() => self.end_step(model, advance),
+            Stage::Divergence => self.solve_velocities(model, advance),
+            Stage::Pressure if solver == Pressure::Dfsph => self.solve_places(model, advance),
+            Stage::Pressure if solver == Pressure::Pbf => self.correct(model, advance),
             Stage::Drift => self.drift(model, advance),
             Stage::Sources => self.sources(model, advance),
             Stage::Cells => self.sort(model),
@@ -149,11 +167,16 @@ impl Backend for Cpu {
             Stage::Boundary => self.boundary(model, advance),
             Stage::Gradients => self.gradients(model),
             Stage::Forces => {
-                self.forces(model, advance);
-                self.held = sources::hold(&mut self.state.particles, model);
+                let part = Advance { dt: advance.part(), ..advance };
+                self.forces(model, part, &Kind::ALL);
+                let held = sources::hold(&mut self.state.particles, model);
+                self.held = held.force;
+                if model.implicit() {
+                    self.implicit.impulse += held.impulse;
+                }
             }
             Stage::Agents => self.agents(model, advance),
-            Stage::Bodies => self.bodies(model, advance),
+            Stage::Bodies => self.bodies(model, advance, true),
             Stage::Kick => self.kick(model, advance),
             Stage::Ledger => self.tally(model, advance),
         }
@@ -336,8 +359,6 @@ impl Cpu {
     }
 
     fn density(&mut self, model: &Model) {
-        self.asleep.clear();
-        self.asleep.extend(self.state.bodies.body.iter().map(|b| b.asleep));
         let p = &mut self.state.particles;
         let around = Around {
             grid: &model.grid,
@@ -347,38 +368,56 @@ impl Cpu {
             cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
             first: p.first,
             asleep: &self.asleep,
+            fluids: true,
             support: model.support as f32,
             contact_reach: model.contact_reach() as f32,
         };
-        let (count, first) = (p.count, p.first);
+        let (n, level) = (p.count[Kind::Fluid as usize], self.level);
+        let chunks = &mut self.neighbours[Kind::Fluid as usize];
+        chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
+        let density = match model.solver.density {
+            Density::Summation => &mut p.density,
+            Density::Continuity => &mut self.summed,
+        };
+        density.resize(n.max(density.len()), 1.0);
+        chunks.par_iter_mut().zip(chunks_mut!(density, ..n)).enumerate().for_each(|(c, (chunk, density))| {
+            let members = c * CHUNK..((c + 1) * CHUNK).min(n);
+            with_scratch(|scratch| {
+                dispatch!(level, simd => density::fluid_chunk(simd, scratch, model, around, members, chunk, density));
+            });
+        });
+        self.find_bodies(model, &[Kind::Rigid, Kind::Static], true);
+    }
+
+    /// Neighbours of bodies' particles; without `fluids` their contacts alone.
+    fn find_bodies(&mut self, model: &Model, kinds: &[Kind], fluids: bool) {
+        self.asleep.clear();
+        self.asleep.extend(self.state.bodies.body.iter().map(|b| b.asleep));
+        let p = &self.state.particles;
+        let around = Around {
+            grid: &model.grid,
+            records: &p.record,
+            places: &self.places,
+            owner: &p.owner,
+            cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
+            first: p.first,
+            asleep: &self.asleep,
+            fluids,
+            support: model.support as f32,
+            contact_reach: model.contact_reach() as f32,
+        };
         let level = self.level;
-        for kind in Kind::ALL {
-            let (n, first) = (count[kind as usize], first[kind as usize]);
+        for &kind in kinds {
+            let segment = p.segment(kind);
             let chunks = &mut self.neighbours[kind as usize];
-            chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
-            let members = |c: usize| first + c * CHUNK..first + ((c + 1) * CHUNK).min(n);
-            if kind == Kind::Fluid {
-                let density = match model.solver.density {
-                    Density::Summation => &mut p.density,
-                    Density::Continuity => &mut self.summed,
-                };
-                density.resize(n.max(density.len()), 1.0);
-                chunks.par_iter_mut().zip(chunks_mut!(density, ..n)).enumerate().for_each(|(c, (chunk, density))| {
-                    with_scratch(|scratch| {
-                        dispatch!(level, simd => {
-                            density::fluid_chunk(simd, scratch, model, around, members(c), chunk, density);
-                        });
-                    });
+            chunks.resize_with(segment.len().div_ceil(CHUNK), NeighbourChunk::default);
+            chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
+                let first = segment.start + c * CHUNK;
+                let members = first..(first + CHUNK).min(segment.end);
+                with_scratch(|scratch| {
+                    dispatch!(level, simd => density::body_chunk(simd, scratch, around, kind, members, chunk));
                 });
-            } else {
-                chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
-                    with_scratch(|scratch| {
-                        dispatch!(level, simd => {
-                            density::body_chunk(simd, scratch, around, kind, members(c), chunk);
-                        });
-                    });
-                });
-            }
+            });
         }
     }
 
@@ -399,6 +438,9 @@ impl Cpu {
     fn boundary(&mut self, model: &Model, advance: Advance) {
         let State { particles: p, bodies: b, .. } = &mut self.state;
         let (level, gravity) = (self.level, model.gravity_at(advance.end()).as_vec3());
+        if model.implicit() && !model.no_slip {
+            return; // pairs see to pressures themselves
+        }
         if model.no_slip {
             self.mirror.resize(p.record.len(), [0.0; 4]);
         }
@@ -446,7 +488,7 @@ impl Cpu {
             });
     }
 
-    fn forces(&mut self, model: &Model, advance: Advance) {
+    fn forces(&mut self, model: &Model, advance: Advance, kinds: &[Kind]) {
         let State { particles: p, bodies: b, .. } = &mut self.state;
         let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
         self.spin.clear();
@@ -462,7 +504,7 @@ impl Cpu {
         let bodies_first = p.first[Kind::Rigid as usize];
         let (mirror, gradient) = (&self.mirror[..], &p.gradient[..]);
         let (dt, fastest) = (advance.dt as f32, self.ledger.speed as f32);
-        for kind in Kind::ALL {
+        for &kind in kinds {
             let first = p.first[kind as usize];
             let segment = first..first + p.count[kind as usize];
             let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
@@ -528,7 +570,8 @@ impl Cpu {
         self.ledger.nonfinite += self.crowd.nonfinite as u64;
     }
 
-    fn bodies(&mut self, model: &Model, advance: Advance) {
+    /// Sums what the particles of bodies feel; unless `all`, of rigid ones alone.
+    fn bodies(&mut self, model: &Model, advance: Advance, all: bool) {
         let State { particles: p, bodies: b, .. } = &mut self.state;
         let (place, push, touch, first) = (&self.place, &p.push, &p.touch, p.first[Kind::Rigid as usize]);
         let felt = |slot: usize| match place[slot].load(Relaxed) {
@@ -536,7 +579,8 @@ impl Cpu {
             at => Some((&push[at as usize], &touch[at as usize - first])),
         };
         let before: Vec<bool> = b.body.iter().map(|b| b.deep).collect();
-        bodies::sum(b, &mut self.parts, felt, model.gravity_at(advance.end()), model.dimensions);
+        let slots = 0..if all { b.record.len() } else { b.rigid_slots };
+        bodies::sum(b, &mut self.parts, slots, felt, model.gravity_at(advance.end()), model.dimensions);
         joints::springs(b, model);
         for (body, before) in b.body.iter_mut().zip(before) {
             let far = body.contacts > 0 && body.v.length() * advance.dt > 0.5 * model.contact_diameter;
@@ -607,8 +651,12 @@ impl Cpu {
             lost: self.ledger.lost,
             nonfinite: self.ledger.nonfinite,
             fast_contacts: self.ledger.fast_contacts,
+            put_back: self.ledger.put_back,
             external_force: self.held + b.joint_force,
-            external_impulse: b.joint_impulse + self.crowd.impulse,
+            external_impulse: if model.implicit() { self.implicit.impulse } else { b.joint_impulse }
+                + self.crowd.impulse,
+            pressure: self.implicit.pressure,
+            divergence: self.implicit.divergence,
             fluid: n,
             rigid_lost: self.cells[Kind::Rigid as usize].lost.saturating_sub(self.scripted_outside(model)),
             ..Ledger::default()
@@ -627,10 +675,21 @@ impl Cpu {
             total.density_error_mean += s.density_error_mean;
             total.density_error_max = total.density_error_max.max(s.density_error_max);
             total.neighbours += s.neighbours;
+            total.pressed += s.pressed;
             full += s.fluid as f64;
         }
         total.density_error_mean /= f64::max(full, 1.0);
         total.neighbours /= f64::max(n as f64, 1.0);
+        total.pressed = (3.0 * total.pressed / f64::max(n as f64, 1.0)).powf(0.25);
+        self.outside_fluids = total.external_force - b.joint_force;
+        for (body, [added, _]) in b.body.iter().zip(&self.implicit.added) {
+            if body.is_static() || body.one_way {
+                self.outside_fluids -= body.force_fluid - *added;
+            }
+            // what bodies got by implicit pressure, fluids lost
+            total.total_force -= *added;
+            total.force_scale += added.length();
+        }
         for body in &b.body {
             if body.is_static() {
                 total.external_force -= body.force;
@@ -662,15 +721,24 @@ impl Cpu {
                 total.kinetic += 0.5 * mass * v.length_squared();
             }
         }
-        for (slot, record) in b.record[..b.rigid_slots].iter().enumerate() {
-            total.body_speed = total.body_speed.max(f64::from(glam::Vec3::from(record.v).length()));
-            if !model.fields.is_empty() && model.moves(b.owner[slot]) {
-                let mass = f64::from(self.particle_mass[b.owner[slot] as usize]);
-                total.external_force += mass * forces::fields(model, record).as_dvec3();
-            }
-        }
+        total.external_force += self.fields_on_bodies(model);
+        let speeds = b.record[..b.rigid_slots].iter().map(|r| f64::from(glam::Vec3::from(r.v).length()));
+        total.body_speed = speeds.fold(0.0, f64::max);
         total.speed = total.speed.max(total.body_speed);
         self.ledger = total;
+    }
+
+    /// What fields do to rigid bodies (N).
+    fn fields_on_bodies(&self, model: &Model) -> DVec3 {
+        let b = &self.state.bodies;
+        if model.fields.is_empty() {
+            return DVec3::ZERO;
+        }
+        let slots = b.record[..b.rigid_slots].iter().zip(&b.owner).filter(|(_, owner)| model.moves(**owner));
+        let force = |(record, owner): (&Record, &u32)| {
+            f64::from(self.particle_mass[*owner as usize]) * forces::fields(model, record).as_dvec3()
+        };
+        slots.map(force).sum()
     }
 
     /// Particles of scripted bodies that are now beyond a solid wall: they may.
@@ -704,6 +772,10 @@ impl Part<'_> {
             let v = DVec3::from(r.v.map(f64::from));
             let a = DVec3::from(self.push[k].map(f64::from));
             let speed = v.length();
+            if model.implicit() {
+                let share = f64::from(r.share / model.fluids[self.owner[k] as usize].density);
+                sum.pressed += share * share;
+            }
             sum.speed = sum.speed.max(speed);
             sum.acceleration = sum.acceleration.max(a.length());
             sum.momentum += mass * v;

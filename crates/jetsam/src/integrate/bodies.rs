@@ -138,18 +138,53 @@ pub fn parts(bodies: &[Body]) -> Vec<Part> {
     bodies.iter().enumerate().flat_map(cut).collect()
 }
 
-/// E18: force and torque of every body from what its slots feel, in the order of slots; gravity (m/s^2) is added to the
-/// whole body.
+/// E18 for one force alone: force and torque of the bodies that have slots in a range, in the order of slots; `thrust` has a
+/// place for every body.
+pub fn thrust<'a>(
+    bodies: &Bodies,
+    parts: &mut [Part],
+    slots: Range<usize>,
+    felt: impl Fn(usize) -> Option<&'a [f32; 3]> + Sync,
+    dimensions: u32,
+    thrust: &mut [[DVec3; 2]],
+) {
+    let (body, offset) = (&bodies.body, &bodies.offset);
+    let within = |part: &&mut Part| slots.contains(&part.slots.start);
+    parts.par_iter_mut().filter(within).for_each(|part| {
+        let q = body[part.body].q;
+        let mut sum = Sum::default();
+        for slot in part.slots.clone() {
+            let Some(f) = felt(slot).filter(|f| **f != [0.0; 3]) else { continue };
+            let f = DVec3::from(f.map(f64::from));
+            sum.force[0] += f;
+            sum.torque[0] += (q * offset[slot]).cross(f);
+        }
+        part.sum = sum;
+    });
+    for part in parts.iter().filter(|part| slots.contains(&part.slots.start)) {
+        let thrust = &mut thrust[part.body];
+        if part.slots.start == body[part.body].slots.start {
+            *thrust = [DVec3::ZERO; 2];
+        }
+        let [force, torque] = [part.sum.force[0], part.sum.torque[0]];
+        *thrust = [thrust[0] + force, thrust[1] + if dimensions == 2 { DVec3::Y * torque.y } else { torque }];
+    }
+}
+
+/// E18: force and torque of every body that has slots in a range from what they feel, in the order of slots; gravity (m/s^2) is added to
+/// the whole body.
 pub fn sum<'a>(
     bodies: &mut Bodies,
     parts: &mut [Part],
+    slots: Range<usize>,
     felt: impl Fn(usize) -> Option<(&'a [f32; 3], &'a Touch)> + Sync,
     gravity: DVec3,
     dimensions: u32,
 ) {
     let (body, offset) = (&bodies.body, &bodies.offset);
     let double = |f: [f32; 3]| DVec3::from(f.map(f64::from));
-    parts.par_iter_mut().for_each(|part| {
+    let within = |part: &&mut Part| slots.contains(&part.slots.start);
+    parts.par_iter_mut().filter(within).for_each(|part| {
         let q = body[part.body].q;
         let mut sum = Sum::default();
         for slot in part.slots.clone() {
@@ -168,7 +203,7 @@ pub fn sum<'a>(
         part.sum = sum;
     });
     let mut total = vec![Sum::default(); bodies.body.len()];
-    for part in &*parts {
+    for part in parts.iter().filter(|part| slots.contains(&part.slots.start)) {
         let (to, from) = (&mut total[part.body], &part.sum);
         for k in 0..3 {
             to.force[k] += from.force[k];
@@ -179,8 +214,9 @@ pub fn sum<'a>(
         to.deep += from.deep;
     }
     for (body, mut sum) in bodies.body.iter_mut().zip(total) {
-        if body.asleep {
-            continue; // what it felt last still holds it
+        // what it felt last still holds one that sleeps
+        if body.asleep || !slots.contains(&body.slots.start) {
+            continue;
         }
         if dimensions == 2 {
             sum.torque = sum.torque.map(|t| DVec3::new(0.0, t.y, 0.0));

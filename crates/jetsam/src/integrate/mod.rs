@@ -20,6 +20,8 @@ pub struct Advance {
     pub dt_before: f64,
     /// Drag on fluids (1/s): not zero only while a scene settles, and then bodies stand still.
     pub drag: f64,
+    /// In how many parts bodies make the step; one with a pressure that is not implicit.
+    pub parts: u32,
 }
 
 impl Advance {
@@ -30,6 +32,11 @@ impl Advance {
 }
 
 impl Advance {
+    /// Length of a part of the step (s): that for which contacts stand.
+    pub fn part(&self) -> f64 {
+        self.dt / f64::from(self.parts.max(1))
+    }
+
     /// Time at the end of the step (s).
     pub fn end(&self) -> f64 {
         self.time + self.dt

@@ -43,6 +43,29 @@ pub fn kick(integrator: Integrator, advance: Advance, records: &mut [Record], pu
     }
 }
 
+/// With implicit pressure (E9): the kick by all forces but pressure.
+pub fn push(advance: Advance, records: &mut [Record], push: &[[f32; 3]]) {
+    let dt = advance.dt as f32;
+    let keep = (-advance.drag * advance.dt).exp() as f32;
+    for (r, a) in records.iter_mut().zip(push) {
+        for c in 0..3 {
+            r.v[c] = keep * (r.v[c] + dt * a[c]);
+        }
+    }
+}
+
+/// With implicit pressure: drift at the velocity found (+ XSPH), and by accelerations that move places alone.
+pub fn glide(advance: Advance, grid: &Grid, records: &mut [Record], carry: &[[f32; 4]], places: &[[f32; 4]]) {
+    let dt = advance.dt as f32;
+    for (k, r) in records.iter_mut().enumerate() {
+        let of = |all: &[[f32; 4]], c: usize| all.get(k).map_or(0.0, |v| v[c]);
+        for c in 0..3 {
+            r.x[c] += dt * (r.v[c] + of(carry, c) + dt * of(places, c));
+        }
+        grid.wrap(&mut r.x);
+    }
+}
+
 /// E1 where density is integrated: `D` predicted to the end of the step (Adams-Bashforth) from the rates one and two
 /// steps ago. With [`correct`] the pair is of second order, and stable for sound as long as `omega dt < 0.6`.
 pub fn predict(advance: Advance, density: &mut [f32], rate: &mut [[f32; 2]], carry: &[[f32; 4]]) {

@@ -192,9 +192,18 @@ pub fn drain(p: &mut Particles, model: &Model, time: f64) {
     });
 }
 
-/// Particles inside hoses go on at the hose's speed: what pushes them is taken away. Returns the force that does so (N).
-pub fn hold(p: &mut Particles, model: &Model) -> DVec3 {
-    let mut held = DVec3::ZERO;
+/// What holds fluid inside hoses to their speed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Held {
+    /// Instead of the forces that were there (N).
+    pub force: DVec3,
+    /// For what pressure had done to velocities already (N s).
+    pub impulse: DVec3,
+}
+
+/// Particles inside hoses go on at the hose's speed: what pushes them is taken away. Returns what does so.
+pub fn hold(p: &mut Particles, model: &Model) -> Held {
+    let mut held = Held::default();
     let n = p.count[Kind::Fluid as usize];
     for source in &model.sources {
         let Some(bore) = source.bore else { continue };
@@ -208,7 +217,8 @@ pub fn hold(p: &mut Particles, model: &Model) -> DVec3 {
             })
             .collect();
         for i in inside.into_iter().flatten().filter(|&i| p.owner[i] == source.fluid) {
-            held -= mass * DVec3::from(p.push[i].map(f64::from));
+            held.force -= mass * DVec3::from(p.push[i].map(f64::from));
+            held.impulse += mass * (source.velocity - DVec3::from(p.record[i].v.map(f64::from)));
             p.push[i] = [0.0; 3];
             p.push_before[i] = [0.0; 3];
             p.record[i].v = source.velocity.as_vec3().to_array();

@@ -94,7 +94,7 @@ pub fn chunk<S: Simd>(
 
 /// Acceleration of a particle of a scripted body (m/s^2): the wall's of Adami et al. 2012, eq. 27.
 #[inline(always)]
-fn acceleration(body: &Body, own: &Record) -> Vec3 {
+pub(super) fn acceleration(body: &Body, own: &Record) -> Vec3 {
     let (a, alpha) = (body.acceleration, body.angular_acceleration);
     if a == DVec3::ZERO && alpha == DVec3::ZERO && (body.omega == DVec3::ZERO || !body.is_static()) {
         return Vec3::ZERO;

@@ -197,10 +197,10 @@ fn on_body<S: Simd, const PLAIN: bool>(
 }
 
 /// Whether a fluid particle meets particles of bodies of a kind by springs (E16): where that is the coupling, and
-/// where the fluid particle has no pressure (spray), as nothing else would hold it outside.
+/// where the fluid particle has no pressure (spray), as nothing else would hold it outside; implicit pressure does.
 #[inline(always)]
 fn springs(model: &Model, kind: Kind, fluid: &Record) -> bool {
-    (kind == Kind::Rigid && model.solver.coupling == Coupling::Spring) || fluid.share <= 0.0
+    (kind == Kind::Rigid && model.solver.coupling == Coupling::Spring) || fluid.share <= 0.0 && !model.implicit()
 }
 
 /// Sum of the forces (E12) of springs between a fluid's particle and bodies'. `constants` gives spring and dashpot for the other and its owner, or

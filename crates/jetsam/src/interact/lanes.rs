@@ -11,7 +11,7 @@
 use crate::state::Record;
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x8, f32x16, u32x16};
+use fearless_simd::{f32x4, f32x8, f32x16, u32x16};
 
 /// Lanes handled at once.
 pub const LANES: usize = 16;
@@ -156,35 +156,35 @@ pub fn squares<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> Lanes {
     (x * x + y * y + z * z).to_array()
 }
 
-/// Particles and a list of indices into them, which are checked once for all.
+/// Values of particles, records unless said otherwise, and a list of indices into them, which are checked once for all.
 #[derive(Clone, Copy)]
-pub struct Listed<'a> {
-    records: &'a [Record],
+pub struct Listed<'a, T = Record> {
+    values: &'a [T],
     list: &'a [u32],
 }
 
 /// Sixteen neighbours out of a checked list.
 #[derive(Clone, Copy)]
-pub struct Near<'a> {
-    records: &'a [Record],
+pub struct Near<'a, T = Record> {
+    values: &'a [T],
     /// Their indices.
     pub index: &'a [u32; LANES],
 }
 
-impl<'a> Listed<'a> {
+impl<'a, T> Listed<'a, T> {
     /// A list of whole vectors.
     ///
     /// # Panics
-    /// If an index is not below the number of records: a defect of the search.
+    /// If an index is not below the number of values: a defect of the search.
     #[inline(always)]
-    pub fn new<S: Simd>(simd: S, records: &'a [Record], list: &'a [u32]) -> Self {
+    pub fn new<S: Simd>(simd: S, values: &'a [T], list: &'a [u32]) -> Self {
         let mut largest = u32x16::splat(simd, 0);
         for block in list.as_chunks().0 {
             largest = largest.max(u32x16::load_array_ref(simd, block));
         }
-        let inside = largest.simd_lt(u32x16::splat(simd, records.len() as u32));
+        let inside = largest.simd_lt(u32x16::splat(simd, values.len() as u32));
         assert!(list.is_empty() || list.len().is_multiple_of(LANES) && simd.to_bitmask_mask32x16(inside) == 0xffff);
-        Self { records, list }
+        Self { values, list }
     }
 
     /// Part of the list as it is.
@@ -195,8 +195,109 @@ impl<'a> Listed<'a> {
 
     /// Part of the list, vector by vector.
     #[inline(always)]
-    pub fn run(self, run: std::ops::Range<usize>) -> impl Iterator<Item = Near<'a>> {
-        self.list[run].as_chunks().0.iter().map(move |index| Near { records: self.records, index })
+    pub fn run(self, run: std::ops::Range<usize>) -> impl Iterator<Item = Near<'a, T>> {
+        self.list[run].as_chunks().0.iter().map(move |index| Near { values: self.values, index })
+    }
+}
+
+/// Sixteen neighbours of a particle and a vector to each, on cache lines of their own.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Link {
+    index: [u32; LANES],
+    e: [Lanes; 3],
+}
+
+/// Neighbours of a chunk of particles with a vector to each, kept while a solver iterates: one stream to read.
+#[derive(Clone, Debug, Default)]
+pub struct Links {
+    blocks: Vec<Link>,
+    used: usize,
+    /// Begin of a particle's blocks, end of those of fluids, end of all.
+    spans: Vec<[u32; 3]>,
+    largest: [u32; LANES],
+}
+
+impl Links {
+    /// Forgets everything, and makes room for the links of a list so long.
+    #[inline(always)]
+    pub fn clear(&mut self, list: usize) {
+        if self.blocks.len() < list / LANES {
+            self.blocks.resize(list / LANES, Link { index: [0; LANES], e: [[0.0; LANES]; 3] });
+        }
+        self.used = 0;
+        self.spans.clear();
+        self.largest = [0; LANES];
+    }
+
+    /// Begins the next particle.
+    #[inline(always)]
+    pub fn begin(&mut self) {
+        self.spans.push([self.used as u32; 3]);
+    }
+
+    /// Ends the particle's fluids.
+    #[inline(always)]
+    pub fn end_fluids(&mut self) {
+        if let Some(span) = self.spans.last_mut() {
+            *span = [span[0], self.used as u32, self.used as u32];
+        }
+    }
+
+    /// Ends the particle's neighbours.
+    #[inline(always)]
+    pub fn end(&mut self) {
+        if let Some(span) = self.spans.last_mut() {
+            span[2] = self.used as u32;
+        }
+    }
+
+    /// Adds sixteen neighbours of the particle begun last.
+    #[inline(always)]
+    pub fn push<S: Simd>(&mut self, simd: S, index: &[u32; LANES], e: &[Lanes; 3]) {
+        self.largest = u32x16::load_array_ref(simd, &self.largest).max(u32x16::load_array_ref(simd, index)).to_array();
+        self.blocks[self.used] = Link { index: *index, e: *e };
+        self.used += 1;
+    }
+
+    /// The links together with values of all particles.
+    ///
+    /// # Panics
+    /// If a neighbour has no value: a defect of the search.
+    #[inline(always)]
+    pub fn with<'a, T>(&'a self, values: &'a [T]) -> Linked<'a, T> {
+        assert!(self.largest.iter().all(|&l| (l as usize) < values.len().max(1)));
+        assert!(self.used == 0 || !values.is_empty());
+        Linked { links: self, values }
+    }
+}
+
+/// Links and values of the neighbours, which are checked to be there.
+#[derive(Clone, Copy)]
+pub struct Linked<'a, T> {
+    links: &'a Links,
+    values: &'a [T],
+}
+
+impl<'a, T> Linked<'a, T> {
+    /// The fluids linked to particle `k` of the chunk, and the vectors to them.
+    #[inline(always)]
+    pub fn fluids(self, k: usize) -> impl Iterator<Item = (Near<'a, T>, &'a [Lanes; 3])> {
+        let [begin, end, _] = self.links.spans[k];
+        self.blocks(begin, end)
+    }
+
+    /// All that are linked to particle `k` of the chunk.
+    #[inline(always)]
+    pub fn all(self, k: usize) -> impl Iterator<Item = (Near<'a, T>, &'a [Lanes; 3])> {
+        let [begin, _, end] = self.links.spans[k];
+        self.blocks(begin, end)
+    }
+
+    #[inline(always)]
+    fn blocks(self, begin: u32, end: u32) -> impl Iterator<Item = (Near<'a, T>, &'a [Lanes; 3])> {
+        let blocks = &self.links.blocks[begin as usize..end as usize];
+        blocks.iter().map(move |b| (Near { values: self.values, index: &b.index }, &b.e))
     }
 }
 
@@ -253,8 +354,38 @@ fn pair<S: Simd>(simd: S, near: Near, k: usize) -> f32x16<S> {
 #[inline(always)]
 fn row<S: Simd>(simd: S, near: Near, k: usize) -> f32x8<S> {
     // SAFETY: `Listed::new` has compared the indices with the number of these very records
-    let record = unsafe { near.records.get_unchecked(near.index[k] as usize) };
+    let record = unsafe { near.values.get_unchecked(near.index[k] as usize) };
     f32x8::load_array_ref(simd, bytemuck::cast_ref::<Record, [f32; 8]>(record))
+}
+
+/// Loads sixteen numbers.
+#[inline(always)]
+pub fn gather_one(near: Near<f32>) -> Lanes {
+    let mut out = [0.0; LANES];
+    for l in 0..LANES {
+        // SAFETY: `Listed::new` or `Links::with` has compared the indices with the number of these very values
+        out[l] = unsafe { *near.values.get_unchecked(near.index[l] as usize) };
+    }
+    out
+}
+
+/// Loads sixteen vectors, whose fourth number is left out.
+#[inline(always)]
+pub fn gather_vectors<S: Simd>(simd: S, near: Near<[f32; 4]>) -> [Lanes; 3] {
+    let r = [four(simd, near, 0), four(simd, near, 4), four(simd, near, 8), four(simd, near, 12)];
+    let (a0, b0) = unzip(r[0], r[1]);
+    let (a1, b1) = unzip(r[2], r[3]);
+    let (x, z) = unzip(a0, a1);
+    [x.to_array(), b0.unzip_low(b1).to_array(), z.to_array()]
+}
+
+/// Four vectors of four numbers in one.
+#[inline(always)]
+fn four<S: Simd>(simd: S, near: Near<[f32; 4]>, k: usize) -> f32x16<S> {
+    // SAFETY: as above
+    let row = |k: usize| unsafe { near.values.get_unchecked(near.index[k] as usize) };
+    let pair = |k: usize| f32x4::load_array_ref(simd, row(k)).combine(f32x4::load_array_ref(simd, row(k + 1)));
+    pair(k).combine(pair(k + 2))
 }
 
 /// Even and odd elements of two vectors on end.

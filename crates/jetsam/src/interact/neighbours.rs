@@ -120,6 +120,8 @@ pub struct Around<'a> {
     pub first: [usize; Kind::COUNT],
     /// Whether each body sleeps: its particles look for no neighbours.
     pub asleep: &'a [bool],
+    /// Whether fluids are looked for.
+    pub fluids: bool,
     /// Support radius (m): how far pairs with fluid reach.
     pub support: f32,
     /// How far pairs of bodies reach (m).
@@ -127,11 +129,12 @@ pub struct Around<'a> {
 }
 
 /// Which kinds act on a particle of kind `kind`: the table of [`crate::laws`].
-fn acting(kind: Kind) -> &'static [Kind] {
-    match kind {
+fn acting(kind: Kind, fluids: bool) -> &'static [Kind] {
+    let all: &[Kind] = match kind {
         Kind::Fluid | Kind::Rigid => &[Kind::Fluid, Kind::Rigid, Kind::Static],
         Kind::Static => &[Kind::Fluid, Kind::Rigid],
-    }
+    };
+    if fluids { all } else { &all[1..] }
 }
 
 impl NeighbourChunk {
@@ -164,7 +167,7 @@ impl NeighbourChunk {
             let asleep = |i: usize| kind == Kind::Rigid && around.asleep[around.owner[i] as usize];
             let all_asleep = (from..to).all(asleep);
             let mut candidates = 0;
-            for &k in if all_asleep { &[] } else { acting(kind) } {
+            for &k in if all_asleep { &[] } else { acting(kind, around.fluids) } {
                 scratch.tile[k as usize].pack(simd, &around, k, cell, (kind, k) == (Kind::Rigid, Kind::Rigid));
                 candidates += padded(scratch.tile[k as usize].len);
             }
@@ -190,7 +193,7 @@ impl NeighbourChunk {
             }
             for i in from..to {
                 let mut runs = Runs { begin: used as u32, count: [0; Kind::COUNT] };
-                for &k in if asleep(i) { &[] } else { acting(kind) } {
+                for &k in if asleep(i) { &[] } else { acting(kind, around.fluids) } {
                     let tile = &scratch.tile[k as usize];
                     if tile.len == 0 {
                         continue;

@@ -99,6 +99,7 @@ pub struct Pairs<'a> {
     inverse: f32,
     softening: f32,
     floor: f32,
+    ceiling: f32,
     mueller: Option<f32>,
     continuity: Option<Diffusion>,
     shift: bool,
@@ -140,6 +141,8 @@ impl<'a> Pairs<'a> {
             inverse: model.inverse_support(),
             softening: model.softening(),
             floor: if solver.negative_pressure { f32::NEG_INFINITY } else { 0.0 },
+            // implicit pressure has pushed already
+            ceiling: if model.implicit() { 0.0 } else { f32::INFINITY },
             mueller: (solver.viscosity == Viscosity::Mueller).then_some(model.factors.laplacian),
             continuity,
             shift: fluid.is_some() && solver.shifting > 0.0,
@@ -203,7 +206,7 @@ impl<'a> Pairs<'a> {
     #[inline(always)]
     fn add_forces<const PLAIN: bool>(&mut self, kernel: Kernel, pairs: &Sixteen, terms: &Terms) -> Lanes {
         let Sixteen { volume, share, d, r_sq, v, seen } = pairs;
-        let (own, own_share) = (self.own, self.own.share.max(self.floor));
+        let (own, own_share) = (self.own, self.own.share.max(self.floor).min(self.ceiling));
         let laminar = if !PLAIN && self.mueller.is_some() { 0.0 } else { 1.0 };
         let mut out = [0.0; LANES];
         for l in 0..LANES {
@@ -211,7 +214,7 @@ impl<'a> Pairs<'a> {
             let volumes = own.volume * volume[l];
             let v_dot_d = v[0][l] * d[0][l] + v[1][l] * d[1][l] + v[2][l] * d[2][l];
             let inverse_sq = fluid::softened_inverse(r_sq[l], self.softening);
-            let along_d = fluid::pressure_force(volumes, own_share, share[l].max(self.floor), g)
+            let along_d = fluid::pressure_force(volumes, own_share, share[l].max(self.floor).min(self.ceiling), g)
                 + fluid::viscosity_artificial(volumes, terms.eta[l], v_dot_d, inverse_sq, g);
             let along_v = fluid::viscosity_laminar(volumes, laminar * terms.mu_sum[l], r_sq[l], inverse_sq, g);
             self.force[0][l] += along_d * d[0][l] + along_v * seen[0][l];

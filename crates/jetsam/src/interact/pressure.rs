@@ -5,13 +5,21 @@
 use crate::laws::fluid;
 use crate::model::Model;
 use crate::scene::{Density, EquationOfState, PressureForce};
-use crate::state::Record;
+use crate::state::{Particles, Record};
 
 /// Pressure (Pa) at relative density `d` of fluid `owner`.
 #[inline]
 pub fn pressure(model: &Model, owner: u32, d: f32) -> f32 {
     let p = of_state(model, owner, d);
     if model.solver.negative_pressure { p } else { p.max(0.0) }
+}
+
+/// Pressure of a fluid particle as it stands (Pa), whatever the solver.
+pub fn of_particle(model: &Model, p: &Particles, i: usize) -> f32 {
+    match model.implicit() {
+        true => p.record[i].share,
+        false => pressure(model, p.owner[i], p.density[i]),
+    }
 }
 
 /// Pressure of either sign (Pa), as the equation of state gives it.

@@ -50,6 +50,11 @@ law_file!(
     "src/laws/fluid.wgsl"
 );
 law_file!(
+    /// E9, implicit pressure (`laws/implicit.wgsl`).
+    implicit,
+    "src/laws/implicit.wgsl"
+);
+law_file!(
     /// E10-E12 and E14, contact of bodies (`laws/contact.wgsl`).
     contact,
     "src/laws/contact.wgsl"

@@ -169,7 +169,7 @@ impl Meter {
                 _ => f64::NAN,
             },
             Of::Steps => world.steps() as f64,
-            Of::Dt => world.model().largest_dt(ledger.speed, ledger.acceleration).0,
+            Of::Dt => world.model().largest_dt(world.model().bounding_speed(ledger), ledger.acceleration).0,
             Of::Spin
             | Of::BodySpin
             | Of::Tilt

@@ -2,7 +2,7 @@
 
 use super::meter::{Meter, Place, Subject, component};
 use super::sums;
-use crate::interact::pressure::pressure;
+use crate::interact::pressure::of_particle;
 use crate::scene::{Norm, Of};
 use crate::state::Kind;
 use crate::world::World;
@@ -74,7 +74,7 @@ pub(super) fn around(world: &World, subject: Subject, points: &[DVec3], solids: 
                 }
                 let relative = p.density[i];
                 let density = f64::from(relative) * f64::from(model.fluids[owner as usize].density);
-                let here = f64::from(pressure(model, owner, relative));
+                let here = f64::from(of_particle(model, p, i));
                 sum.fluid += weight;
                 sum.pressure += weight * (here - density * model.gravity.dot(d));
                 sum.density += weight * density;

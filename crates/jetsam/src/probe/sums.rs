@@ -2,7 +2,7 @@
 
 use super::meter::{Meter, Place, Subject, component};
 use super::places::way;
-use crate::interact::pressure::pressure;
+use crate::interact::pressure::of_particle;
 use crate::scene::{Component, End, EquationOfState, Force, Of};
 use crate::state::{Body, Kind, Record};
 use crate::world::World;
@@ -44,7 +44,7 @@ pub(super) fn particles<'a>(meter: &'a Meter, world: &'a World) -> impl Iterator
             mass: f64::from(fluid.mass),
             rest_density,
             density: rest_density * f64::from(p.density[i]),
-            pressure: f64::from(pressure(model, owner, p.density[i])),
+            pressure: f64::from(of_particle(model, p, i)),
         })
     })
 }

@@ -154,6 +154,15 @@ pub struct Solver {
     /// How pressure is found.
     #[serde(default)]
     pub pressure: Pressure,
+    /// Mean compression, as a fraction of the rest density, at which the iterations of implicit pressure end (E9).
+    #[serde(default = "d::tolerance")]
+    pub tolerance: f64,
+    /// The same for the compression that velocities bring in a step (E9, DFSPH).
+    #[serde(default = "d::divergence_tolerance")]
+    pub divergence_tolerance: f64,
+    /// Most iterations of implicit pressure in a step, of each kind (E9): a budget for real time.
+    #[serde(default = "d::iterations")]
+    pub iterations: f64,
     /// How density is found (E1).
     #[serde(default)]
     pub density: Density,
@@ -222,7 +231,8 @@ pub struct Solver {
     /// Time integration (E20).
     #[serde(default)]
     pub integrator: Integrator,
-    /// Time step, in place of what E29 derives; only the end of a frame may shorten it.
+    /// Time step, in place of what E29 derives; only the end of a frame may shorten it. With implicit pressure the longest step, which
+    /// the flow may shorten.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dt: Option<f64>,
     /// `C_a` of E29: fraction of the time sound takes through half a support.
@@ -234,6 +244,12 @@ pub struct Solver {
     /// `C_v` of E29: bound by viscosity.
     #[serde(default = "d::courant_viscous")]
     pub courant_viscous: f64,
+    /// Spacings that the fastest particle moves in a step of implicit pressure (E29). When absent, 0.6 with DFSPH and 1 with PBF.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub courant_flow: Option<f64>,
+    /// Longest step of implicit pressure (E29). When absent, 1/200 s with DFSPH and 1/120 s with PBF.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub longest_dt: Option<f64>,
     /// How long a body lies still on others before it sleeps, and costs nothing until something touches it. 0: never.
     #[serde(default = "d::sleep")]
     pub sleep: f64,
@@ -252,9 +268,17 @@ impl Default for Solver {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Pressure {
-    /// Weakly compressible SPH: pressure from density by an equation of state.
+    /// By purpose, which `jetsam check` says: weakly compressible SPH, the one that is validated throughout. The others are for
+    /// pictures and play, and are stated.
     #[default]
+    Auto,
+    /// Weakly compressible SPH: pressure from density by an equation of state (E3). Steps are bound by the speed of sound.
     Wcsph,
+    /// Divergence-free SPH (E9; Bender and Koschier 2015): pressures iterated until densities do not rise. Steps are bound by the
+    /// flow.
+    Dfsph,
+    /// Position based fluids (E9; Macklin and Mueller 2013): places iterated until densities are those of rest. Robust at any step.
+    Pbf,
 }
 
 /// E1.

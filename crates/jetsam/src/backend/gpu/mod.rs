@@ -62,11 +62,14 @@ impl Flows {
     }
 }
 
+/// Kernels in their order, each with its workgroups.
+type Kernels = Vec<(Kernelet, [u32; 2])>;
+
 /// What a scene needs on the device.
 struct Ready {
     sizes: Sizes,
     buffers: Buffers,
-    stages: Vec<(Stage, Vec<(Kernelet, [u32; 2])>)>,
+    stages: Vec<(Stage, Kernels)>,
     choose: Kernelet,
     timers: Option<Timers>,
 }
@@ -80,6 +83,9 @@ struct Timers {
 
 /// Why a scene cannot run on a GPU yet, in words.
 pub fn unsupported(model: &Model) -> Option<&'static str> {
+    if model.implicit() {
+        return Some("implicit pressure (solver.pressure = \"dfsph\" or \"pbf\")");
+    }
     if !model.joints.is_empty() {
         return Some("joints");
     }
@@ -528,6 +534,7 @@ fn to_ledger(s: &Sums, before: &Ledger) -> Ledger {
         rigid_lost: rigid_lost as usize,
         fast_contacts: before.fast_contacts + u64::from(fast),
         nonfinite: before.nonfinite + u64::from(nonfinite),
+        ..Ledger::default()
     }
 }
 

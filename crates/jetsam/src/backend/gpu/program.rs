@@ -11,12 +11,11 @@ use crate::interact::contacts::{DEEP, HELD};
 use crate::interact::pairs::SHIFTED_ABOVE;
 use crate::interact::pressure::BELOW_SUM;
 use crate::laws::kernel::Kernel;
-use crate::model::{CONTACT_REACH, DtBound, Model, TANGENTIAL, TANGENTIAL_DAMPING};
+use crate::model::{CONTACT_REACH, DtBound, Model, TANGENTIAL, TANGENTIAL_DAMPING, TRAVEL};
 use crate::scene::{
     Coupling, Damping, Density, EquationOfState, Force, Integrator, PressureForce, Surface, Viscosity, Wall,
 };
 use crate::stage::Stage;
-use crate::world::TRAVEL;
 use glam::DVec3;
 use std::fmt::Write as _;
 use wgpu::naga;
@@ -105,6 +104,7 @@ pub fn kernels(stage: Stage) -> &'static [(&'static str, Over)] {
             ("gather", Moving(256)),
         ],
         Stage::Density => &[("density", Fluids(128))],
+        Stage::Divergence => &[],
         Stage::Pressure => &[("pressure", Fluids(128))],
         Stage::Boundary => &[("boundary", BodyParticles(128))],
         Stage::Gradients => &[("gradients", Fluids(128))],

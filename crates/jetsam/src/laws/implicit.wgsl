@@ -1,0 +1,30 @@
+// E9: pressures that keep densities from rising, found by iteration (DFSPH, PBF).
+//   e_ij = V_j grad_i W_ij = -V_j G d_ij      share s = p / D^2, the multiplier of D_i <= 1 over V_i
+//   Forces are those of E4, so that densities answer to shares by the transpose of what shares push with.
+
+// Factor of d_ij in e_ij.
+fn link(V_j: f32, G: f32) -> f32 {
+  return -V_j * G;
+}
+
+// How fast, per unit of its own share, the density of i is driven down (1/(Pa s^2)); alpha of Bender and Koschier 2015,
+// eq. 8. fluids_sq = |sum e_ij|^2 over fluids with the part of bodies in it, pairs = sum |e_ij|^2 / rho_j over fluids.
+fn response(fluids_dot_all: f32, all_sq: f32, inverse_rho: f32, pairs: f32) -> f32 {
+  return max(fluids_dot_all, all_sq) * inverse_rho + pairs;
+}
+
+// A share after one more round: never negative, as fluids bear no tension. error = what D is above 1, or its rate above 0.
+fn relaxed(share: f32, error: f32, rate: f32) -> f32 {
+  return max(share + error * rate, 0.0);
+}
+
+// E17, pair by pair: a body's particle shows the pressure of the fluid's, p_i + rho_i (g - a_b) . d_ib. The part of gravity
+// fades out with p_i, so that no pair pulls: factor of the second term in the sum of both shares.
+fn hold(share: f32, limit: f32) -> f32 {
+  return min(2.0 * share / limit, 1.0);
+}
+
+// Sum of the shares of a fluid particle and a body's.
+fn share_at_boundary(share: f32, hold: f32, pull_dot_d: f32) -> f32 {
+  return 2.0 * share + hold * pull_dot_d;
+}
