@@ -3,12 +3,12 @@
 use crate::{Frame, Show};
 use glam::{DVec3, Vec3};
 use jetsam::assemble::Assembly;
+use jetsam::gpu::Gpu;
 use jetsam::ledger::Ledger;
 use jetsam::model::DtBound;
 use jetsam::report::StageMillis;
 use jetsam::scene::{Rigid, Scene, Shape};
 use jetsam::world::{Grip, Mismatch};
-use jetsam::gpu::Gpu;
 use jetsam::{Choice, Trouble, World};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};

@@ -62,11 +62,14 @@ impl Flows {
     }
 }
 
+/// Kernels in their order, each with its number of groups.
+type Kernels = Vec<(Kernelet, [u32; 2])>;
+
 /// What a scene needs on the device.
 struct Ready {
     sizes: Sizes,
     buffers: Buffers,
-    stages: Vec<(Stage, Vec<(Kernelet, [u32; 2])>)>,
+    stages: Vec<(Stage, Kernels)>,
     choose: Kernelet,
     timers: Option<Timers>,
 }
