@@ -536,7 +536,8 @@ mod tests {
     /// Both sides put every number in the same place, as naga tells.
     #[test]
     fn both_sides_agree_on_offsets() {
-        let text = "[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n[resolution]\nspacing = 0.1\n";
+        let text = "domain = { min = [0, 0, 0], max = [1, 1, 1] }\nresolution = { spacing = 0.1 }\n\
+                    [[fluid]]\nshape = { box = { min = [0, 0, 0], max = [1, 1, 1] } }\n";
         let scene = crate::Scene::parse(crate::scene::Source { text: text.into(), ..Default::default() }, &[])
             .unwrap_or_else(|e| panic!("{e}"));
         let model = scene.assemble().unwrap_or_else(|e| panic!("{e}")).model;
