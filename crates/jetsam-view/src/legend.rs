@@ -54,7 +54,7 @@ pub fn number(x: f32) -> String {
     let size = x.abs();
     if size == 0.0 {
         "0".into()
-    } else if size >= 1e5 || size < 1e-2 {
+    } else if !(1e-2..1e5).contains(&size) {
         format!("{x:.1e}")
     } else if size >= 100.0 {
         format!("{x:.0}")

@@ -14,12 +14,13 @@ use jetsam::integrate::{Advance, bodies::follow};
 use jetsam::scene::Pressure;
 use jetsam::stage::Stage;
 use jetsam::state::{Kind, State};
+use jetsam::world::Grip;
 use jetsam::{Scene, Trouble, World, state_hash};
 use libtest_mimic::{Arguments, Trial, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let tests: [(&str, fn()); 20] = [
+    let tests: [(&str, fn()); 21] = [
         ("stages_agree_in_a_tank_with_bodies", stages_agree_in_a_tank_with_bodies),
         ("stages_agree_with_every_law", stages_agree_with_every_law),
         ("stages_agree_in_two_dimensions", stages_agree_in_two_dimensions),
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         ("queued_steps_are_steps", queued_steps_are_steps),
         ("sources_and_sinks_agree", sources_and_sinks_agree),
         ("scripts_are_followed", scripts_are_followed),
+        ("a_hand_is_felt_alike", a_hand_is_felt_alike),
         ("a_lost_device_is_said", a_lost_device_is_said),
         ("scenes_agree", scenes_agree),
         ("steering_flocks_agree", steering_flocks_agree),
@@ -81,6 +83,35 @@ shape = { box = { min = [0.14, 0.1, 0.225], max = [0.3, 0.26, 0.34] } }
 velocity = [0.2, 0, -0.5]
 friction = 0.3
 "#;
+
+/// A body held, fluid poured and the hose moved, another gravity: on both backends the same comes of it.
+fn a_hand_is_felt_alike() {
+    let scene = scene(TANK);
+    let hose = |x: f64, time: f64| scene.hose(DVec3::new(x, 0.2, 0.7), DVec3::NEG_Z, 0.06, 1.0, time).unwrap();
+    let run = |mut world: World| {
+        let on = |world: &mut World, until: f64| world.advance(until, |_, step| step.trouble.is_none());
+        let to = world.state().bodies.body[0].x + DVec3::new(-0.05, 0.05, 0.1);
+        world.grip(Some(Grip { body: 0, at: DVec3::new(0.02, 0.0, 0.0), to }));
+        on(&mut world, 0.06);
+        world.grip(None);
+        world.pour(Some(hose(0.45, world.time())));
+        on(&mut world, 0.15);
+        world.pour(Some(hose(0.4, world.time())));
+        on(&mut world, 0.24);
+        world.pour(None);
+        let calmer = scene.with(&["world.gravity=[0, 0, -2]".into()]).unwrap();
+        world.take_over(calmer.assemble().unwrap()).map_err(|e| e.0).unwrap();
+        on(&mut world, 0.28);
+        assert!(world.fault().is_none(), "{:?}", world.fault());
+        let body = world.state().bodies.body[0].clone();
+        let poured = world.fluid().count();
+        (body.x, poured, world.ledger().lost, world.ledger().born, world.momentum_residual())
+    };
+    let (cpu, gpu) = (run(World::from_scene(&scene).unwrap()), run(on_gpu(TANK)));
+    assert!(cpu.0.distance(gpu.0) < 0.01, "{} {}", cpu.0, gpu.0);
+    assert_eq!((cpu.1, cpu.2, cpu.3), (gpu.1, gpu.2, gpu.3));
+    assert!(cpu.3 > 0 && gpu.4 < 0.02, "{cpu:?} {gpu:?}");
+}
 
 /// Periodic water and oil with everything that can be asked of pairs.
 const LAWS: &str = r#"

@@ -152,7 +152,7 @@ fn flow(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     let ex = 0.5 * zx * dx - zxx * d;
     let ey = 0.5 * zy * dy - zyy * d;
     let h = 0.5 * (cy * ex + cx * ey) / (d * sqrt(d));
-    // a step in units of the size of a pixel at this depth: stable below a quarter
-    let step = look.smoothing.z * cx * z;
-    return vec4(z - clamp(step * h * cx * z, -0.5 * look.smoothing.y, 0.5 * look.smoothing.y), 0.0, 0.0, 0.0);
+    // over a flat surface h is half the Laplacian in pixels over the size of a pixel: this step is one of diffusion, stable below 1/4
+    let step = 2.0 * look.smoothing.z * cx * z;
+    return vec4(z - clamp(step * h, -0.5 * look.smoothing.y, 0.5 * look.smoothing.y), 0.0, 0.0, 0.0);
 }

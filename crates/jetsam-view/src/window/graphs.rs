@@ -7,8 +7,11 @@ use std::collections::VecDeque;
 /// Moments remembered.
 const MEMORY: usize = 600;
 
+/// Name of a quantity, and where it is read.
+type Quantity = (&'static str, fn(&Numbers) -> f64);
+
 /// Quantities that have a graph.
-const GRAPHS: [(&str, fn(&Numbers) -> f64); 5] = [
+const GRAPHS: [Quantity; 5] = [
     ("real-time factor", |n| n.real_time_factor),
     ("step (ms)", |n| n.step_ms),
     ("density error (%)", |n| 100.0 * n.ledger.density_error_mean),

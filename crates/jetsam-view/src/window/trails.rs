@@ -30,7 +30,7 @@ impl Trails {
         let fluid = frame.segment(Kind::Fluid);
         let every = (fluid.len() / FOLLOWED).max(1) as u32;
         let mut seen = HashMap::new();
-        for i in fluid.filter(|&i| frame.tag[i][0] % every == 0) {
+        for i in fluid.filter(|&i| frame.tag[i][0].is_multiple_of(every)) {
             let id = frame.tag[i][0];
             let mut past = self.past.remove(&id).unwrap_or_default();
             past.push_back(frame.record[i].x.into());
