@@ -75,7 +75,7 @@ fn aim_at(scene: &mut Scene, solver: Pressure, aim: f64) -> miette::Result<()> {
     match solver {
         Pressure::Dfsph | Pressure::Auto => {
             (s.tolerance, s.divergence_tolerance) =
-                if coarse { (0.5 * aim, 0.1 * aim) } else { (0.7 * aim, 0.1 * aim) };
+                if coarse { (0.5 * aim, 0.04 * aim) } else { (0.7 * aim, 0.1 * aim) };
             s.courant_flow = Some(if coarse { 1.0 } else { 0.4 });
             s.longest_dt = Some(1.0 / 120.0);
         }
