@@ -456,7 +456,9 @@ fn a_lost_device_is_said() {
 /// The built-in scenes, coarse, for twenty steps.
 fn scenes_agree() {
     for (name, spacing) in [("monkey-splash", 0.045), ("mountain-slide", 0.06), ("dam-break", 0.06), ("school", 0.05)] {
-        let scene = Scene::builtin(name, &[format!("resolution.spacing={spacing}")]).unwrap().unwrap();
+        let scene = Scene::builtin(name, &[format!("resolution.spacing={spacing}"), "solver.pressure=wcsph".into()])
+            .unwrap()
+            .unwrap();
         let mut cpu = World::from_scene(&scene).unwrap();
         let mut gpu = gpu_world(scene.assemble().unwrap());
         let dt = 0.8 * cpu.model().largest_dt(cpu.ledger().speed, cpu.ledger().acceleration).0;
