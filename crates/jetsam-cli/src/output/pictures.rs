@@ -7,7 +7,7 @@ use crate::terminal::say;
 use glam::{DVec3, Vec3};
 use jetsam::gpu::devices;
 use jetsam::{FrameStats, Scene, World};
-use jetsam_view::{Animation, Ball, Camera, Frame, Image, Options, Show, Style, color, legend, paint, render};
+use jetsam_view::{Animation, Ball, Camera, Frame, Image, Options, Show, Style, color, paint, render};
 use miette::{IntoDiagnostic, miette};
 use std::path::{Path, PathBuf};
 
@@ -139,7 +139,7 @@ impl Painter {
             Self::Gpu { studio, style, legend: wanted } => {
                 let mut image = studio.picture(frame, style, &[])?;
                 if *wanted {
-                    legend(&mut image, studio.show(), style);
+                    jetsam_view::legend(&mut image, studio.show(), style);
                 }
                 Ok(image)
             }
