@@ -187,9 +187,9 @@ fn travel(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<
     if (rule.kind.x == REYNOLDS) { v = kicked(rule, v, going, dt); }
     if (rule.kind.x == COUZIN) { v = going; }
     // what rounding left over is carried on (Kahan 1965)
-    let y = dt * v - a.rest.xyz;
-    var x = a.x.xyz + y;
-    a.rest = vec4<f32>((x - a.x.xyz) - y, 0.0);
+    let carried = kept(a.x.xyz, a.rest.xyz, dt * v);
+    var x = carried.sum;
+    a.rest = vec4<f32>(carried.rest, 0.0);
     let in_sides = inside_sides(x, rule.body.x);
     x = in_sides.x;
     v = bounced(v, in_sides.sides);

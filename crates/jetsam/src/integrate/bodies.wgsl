@@ -6,14 +6,6 @@ fn spin(b: Body, q: vec4<f32>, l: vec3<f32>) -> vec3<f32> {
   return turn(q, b.inertia_x.xyz * own.x + b.inertia_y.xyz * own.y + b.inertia_z.xyz * own.z);
 }
 
-// A sum and what rounding left over of it (Kahan 1965).
-struct Kept { sum: vec3<f32>, rest: vec3<f32> }
-fn kept(sum: vec3<f32>, rest: vec3<f32>, more: vec3<f32>) -> Kept {
-  let y = more - rest;
-  let t = sum + y;
-  return Kept(t, (t - sum) - y);
-}
-
 @compute @workgroup_size(64)
 fn drift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let k = number(g, n, l, 64u);

@@ -28,7 +28,7 @@ struct Constants {
   far_corner: vec4<f32>,  // the other end of the domain (m)
   kernel: vec4<f32>,      // factors of W, of G; W at one spacing, W at no distance
   tune: vec4<f32>,        // factor of the Laplacian; softening (m^2); XSPH; shifting
-  contact: vec4<f32>,     // square of the rate (1/s^2) that makes springs of masses; vorticity times spacing (m)
+  contact: vec4<f32>,     // square of the rate (1/s^2) that makes springs of masses; vorticity times spacing (m); 1
   step: vec4<f32>,        // courant, courant_force, bound that does not change (s), stated dt (s) or 0
   cells: vec4<u32>,       // cells on each axis; w: their number
   count: vec4<u32>,       // capacity of fluids, slots of rigid bodies, slots of all bodies, bodies
@@ -85,7 +85,7 @@ struct Part { body: u32, first: u32, end: u32, unused: u32 }
 // Time, and what the last step left behind for this one.
 struct Clock {
   dt: f32, dt_before: f32, left: f32, drag: f32,
-  gravity: vec4<f32>,      // now, shaking included
+  gravity: vec4<f32>,      // now, shaking included; w: what rounding left over of `left`
   fastest: f32,            // largest speed of any particle
   running: u32,            // 0 once the frame is over: kernels then do nothing
   step: u32,               // steps of this frame so far
@@ -314,6 +314,15 @@ fn scan_group(l: u32, own: u32) -> vec2<u32> {
   let result = vec2<u32>(scan_sums[l] - own, scan_sums[255]);
   workgroupBarrier();
   return result;
+}
+
+// A sum and what rounding left over of it (Kahan 1965). Some drivers take (a + b) - a for b: the factor of 1, which they do not know,
+// keeps them from it.
+struct Kept { sum: vec3<f32>, rest: vec3<f32> }
+fn kept(sum: vec3<f32>, rest: vec3<f32>, more: vec3<f32>) -> Kept {
+  let y = more - rest;
+  let t = (sum + y) * m.contact.z;
+  return Kept(t, (t - sum) - y);
 }
 
 // Quaternions, the real part last.

@@ -234,7 +234,7 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         far_corner: single(g.max, 0.0),
         kernel: [f.w, f.g, f.w_spacing, f.w_own],
         tune: [f.laplacian, model.softening(), s.xsph as f32, s.shifting as f32],
-        contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 0.0, 0.0],
+        contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 1.0, 0.0],
         step: [s.courant as f32, s.courant_force as f32, fixed as f32, s.dt.unwrap_or(0.0) as f32],
         cells: [x, y, z, sizes.cells],
         count: [sizes.fluids, sizes.rigid, sizes.slots, sizes.bodies],

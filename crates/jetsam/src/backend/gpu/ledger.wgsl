@@ -123,7 +123,10 @@ fn total(@builtin(local_invocation_index) l: u32) {
   clock.fastest = all.step.z;
   clock.dt_before = clock.dt;
   clock.step += 1u;
-  clock.left -= clock.dt;
+  // thousands of steps would not add up to a frame: what rounding leaves over is kept (Kahan 1965)
+  let left = kept(vec3<f32>(clock.left), vec3<f32>(clock.gravity.w), vec3<f32>(-clock.dt));
+  clock.gravity.w = left.rest.x;
+  clock.left = select(left.sum.x, 0.0, clock.bound == BY_FRAME);
   clock.elapsed += clock.dt;
 }
 
@@ -131,8 +134,8 @@ fn total(@builtin(local_invocation_index) l: u32) {
 @compute @workgroup_size(1)
 fn choose() {
   if (clock.own == 0u) { return; }
-  var left = clock.left;
-  if (left <= 0.0) { clock.running = 0u; return; }
+  var left = clock.left - clock.gravity.w;
+  if (clock.left <= 0.0) { clock.running = 0u; return; }
   var end = BY_FRAME;
   if (HAS_FLOCKS) {
     // a step ends where a decision is due
