@@ -103,17 +103,15 @@ fn describe(s: &Summary, folder: &Path) -> String {
         n => format!(", {n} bodies of {} particles", s.rigid_particles),
     };
     let agents = if s.agents > 0 { format!(", {} agents", s.agents) } else { String::new() };
-    let iterations = match (s.pressure_iterations, s.divergence_iterations) {
-        (0.0, 0.0) => "none: pressure by an equation of state".into(),
-        (places, velocities) => format!(
-            "pressure {places:.1} a step, {:.2} % left; divergence {velocities:.1}, {:.3} % left",
-            100.0 * s.pressure_residual,
-            100.0 * s.divergence_residual
-        ),
-    };
+    let (places, velocities) = (s.pressure_iterations, s.divergence_iterations);
+    let iterations = format!(
+        "pressure {places:.1} a step, {:.2} % left; divergence {velocities:.1}, {:.3} % left",
+        100.0 * s.pressure_residual,
+        100.0 * s.divergence_residual
+    );
     let back = if s.put_back > 0 { format!(" ({} put back from walls)", s.put_back) } else { String::new() };
     let left = if s.left > 0 { format!(" ({} left through open sides)", s.left) } else { String::new() };
-    table(&[
+    let mut rows = vec![
         ("real-time factor", format!("{:.3}  ({} in {})", s.real_time_factor, seconds(s.time), seconds(s.wall_s))),
         ("steps", format!("{}, mean {}{bound}", s.steps, seconds(s.dt))),
         ("particles", format!("{} fluid{bodies}{agents}", s.fluid)),
@@ -121,13 +119,16 @@ fn describe(s: &Summary, folder: &Path) -> String {
             "density error",
             format!("mean {:.2} %, max {:.2} %", 100.0 * s.density_error_mean, 100.0 * s.density_error_max),
         ),
-        ("iterations", iterations),
         ("lost particles", format!("{}{left}{back}", s.lost)),
         ("fast contacts", s.fast_contacts.to_string()),
         ("momentum residual", format!("{:.1e}", s.momentum_residual)),
         ("state hash", s.state_hash.clone()),
         ("output", folder.display().to_string()),
-    ])
+    ];
+    if places + velocities > 0.0 {
+        rows.insert(4, ("iterations", iterations));
+    }
+    table(&rows)
 }
 
 /// Whether the run can be believed.

@@ -150,7 +150,9 @@ fn a_run_is_quiet_in_a_pipe_and_repeats_to_the_last_bit() {
         let run = jetsam(&dir, &["run", &file, "--save", "csv", "--threads", threads, "--out", out]);
         let message = text(&run.stderr);
         assert!(run.stdout.is_empty(), "{}", text(&run.stdout));
-        assert!(message.lines().count() < 12 && !message.contains(['\r', '\u{1b}']), "{message}");
+        // some graphics drivers have a word of their own where there is no display
+        let ours = message.lines().filter(|l| !l.starts_with("error: XDG_RUNTIME_DIR"));
+        assert!(ours.count() < 12 && !message.contains(['\r', '\u{1b}']), "{message}");
         let line = message.lines().find(|l| l.starts_with("state hash")).unwrap().to_owned();
         (line, std::fs::read(dir.join(out).join("bodies.csv")).unwrap())
     };
