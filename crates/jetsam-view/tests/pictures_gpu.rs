@@ -294,7 +294,7 @@ fn golden_pictures() {
         (Show::new(&scene, &world, WIDTH as f32 / HEIGHT as f32), Frame::of(&world))
     };
     let coarse = "resolution.spacing=0.05";
-    let monkeys = open("monkey-splash", &[coarse, "rigid.0.copies.count=3"]);
+    let monkeys = open("monkey-splash", &[coarse, "rigid.0.copies.count=3", "solver.pressure=wcsph"]);
     let school = open("school", &[coarse, "rigid.0.copies.count=2"]);
     let dam = open("dam-break", &[coarse]);
     let surface = Style { fluid: Fluid::Surface, ..Style::default() };
