@@ -45,7 +45,7 @@ pub enum GpuError {
         reason: String,
     },
     /// Something is larger than the device allows.
-    #[error("{what} take {needs} bytes, but {device} holds {limit} in one buffer")]
+    #[error("{what} take {needs} bytes, but {device} holds {limit} in one buffer{}", fits(*.count, *.needs, *.limit))]
     #[diagnostic(
         code(jetsam::gpu::limit),
         help("use a larger spacing, a mesh of fewer triangles, or the backend `cpu`")
@@ -53,7 +53,9 @@ pub enum GpuError {
     Limit {
         /// What is too large.
         what: &'static str,
-        /// Its size.
+        /// How many there are; 0 where that says nothing.
+        count: u64,
+        /// Their size.
         needs: u64,
         /// The smaller of `max_storage_buffer_binding_size` and `max_buffer_size`.
         limit: u64,
@@ -82,6 +84,14 @@ pub enum GpuError {
         /// What the driver says.
         reason: String,
     },
+}
+
+/// How many of so many items fit into what a device holds, in words.
+fn fits(count: u64, needs: u64, limit: u64) -> String {
+    if count == 0 {
+        return String::new();
+    }
+    format!(": {} of {count} would fit", (count as f64 * limit as f64 / needs as f64) as u64)
 }
 
 /// What kind of device it is, the most welcome first.
@@ -124,11 +134,17 @@ impl DeviceInfo {
     /// An error unless a buffer of that size can be bound.
     #[cfg(feature = "gpu")]
     pub(crate) fn holds(&self, what: &'static str, needs: u64) -> Result<(), GpuError> {
+        self.holds_all(what, 0, needs)
+    }
+
+    /// The same of so many items: the error then says how many would fit.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn holds_all(&self, what: &'static str, count: u64, needs: u64) -> Result<(), GpuError> {
         let limit = self.max_buffer_bytes;
         if needs <= limit {
             return Ok(());
         }
-        Err(GpuError::Limit { what, needs, limit, device: self.name.clone() })
+        Err(GpuError::Limit { what, count, needs, limit, device: self.name.clone() })
     }
 }
 
@@ -314,5 +330,7 @@ mod tests {
         let fault = info.holds("vertices", (128 << 20) + 1).unwrap_err();
         assert_eq!(fault.to_string(), "vertices take 134217729 bytes, but a card holds 134217728 in one buffer");
         assert!(fault.help().is_some());
+        let fault = info.holds_all("particles", 8 << 20, 256 << 20).unwrap_err();
+        assert!(fault.to_string().ends_with(": 4194304 of 8388608 would fit"), "{fault}");
     }
 }

@@ -201,6 +201,24 @@ macro_rules! chunks_mut {
     };
 }
 
+/// What is around particles; with `fluids` or for contacts alone. A macro, as its parts are borrowed one by one.
+macro_rules! around {
+    ($cpu:expr, $particles:expr, $model:expr, $fluids:expr) => {
+        Around {
+            grid: &$model.grid,
+            records: &$particles.record,
+            places: &$cpu.places,
+            owner: &$particles.owner,
+            cells: [&$cpu.cells[0], &$cpu.cells[1], &$cpu.cells[2]],
+            first: $particles.first,
+            asleep: &$cpu.asleep,
+            fluids: $fluids,
+            support: $model.support as f32,
+            contact_reach: $model.contact_reach() as f32,
+        }
+    };
+}
+
 impl Cpu {
     fn drift(&mut self, model: &Model, advance: Advance) {
         let State { particles: p, bodies: b, .. } = &mut self.state;
@@ -360,18 +378,7 @@ impl Cpu {
 
     fn density(&mut self, model: &Model) {
         let p = &mut self.state.particles;
-        let around = Around {
-            grid: &model.grid,
-            records: &p.record,
-            places: &self.places,
-            owner: &p.owner,
-            cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
-            first: p.first,
-            asleep: &self.asleep,
-            fluids: true,
-            support: model.support as f32,
-            contact_reach: model.contact_reach() as f32,
-        };
+        let around = around!(self, p, model, true);
         let (n, level) = (p.count[Kind::Fluid as usize], self.level);
         let chunks = &mut self.neighbours[Kind::Fluid as usize];
         chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
@@ -394,18 +401,7 @@ impl Cpu {
         self.asleep.clear();
         self.asleep.extend(self.state.bodies.body.iter().map(|b| b.asleep));
         let p = &self.state.particles;
-        let around = Around {
-            grid: &model.grid,
-            records: &p.record,
-            places: &self.places,
-            owner: &p.owner,
-            cells: [&self.cells[0], &self.cells[1], &self.cells[2]],
-            first: p.first,
-            asleep: &self.asleep,
-            fluids,
-            support: model.support as f32,
-            contact_reach: model.contact_reach() as f32,
-        };
+        let around = around!(self, p, model, fluids);
         let level = self.level;
         for &kind in kinds {
             let segment = p.segment(kind);

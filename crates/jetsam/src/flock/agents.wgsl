@@ -15,7 +15,7 @@ fn direction_of(v: vec3<f32>) -> vec3<f32> {
 }
 fn apart(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> { return wrap(b - a); }
 
-// Particles of a kind in the cells that a ball touches; each cell once.
+// Particles of a kind, or agents of a flock, in the cells that a ball touches: see backend/gpu/region.wgsl.
 struct Region { low: vec3<i32>, size: vec3<i32>, bins: u32, run: i32, at: u32, end: u32 }
 
 fn span(x: f32, radius: f32, origin: f32, inverse: f32, cells: i32, period: f32) -> vec2<i32> {
@@ -28,73 +28,7 @@ fn span(x: f32, radius: f32, origin: f32, inverse: f32, cells: i32, period: f32)
   let first = clamp(low, 0, cells - 1);
   return vec2<i32>(first, clamp(high, 0, cells - 1) - first + 1);
 }
-fn region(x: vec3<f32>, radius: f32, kind: u32) -> Region {
-  let n = vec3<i32>(m.cells.xyz);
-  let a = span(x.x, radius, m.origin.x, m.per_cell.x, n.x, m.period.x);
-  var b = span(x.y, radius, m.origin.y, m.per_cell.y, n.y, m.period.y);
-  if (FLAT) { b = vec2<i32>(0, 1); }
-  let c = span(x.z, radius, m.origin.z, m.per_cell.z, n.z, m.period.z);
-  return Region(vec3<i32>(a.x, b.x, c.x), vec3<i32>(a.y, b.y, c.y), bins_of(kind), -1, 0u, 0u);
-}
 fn wrapped(c: i32, n: i32) -> i32 { return select(select(c, c + n, c < 0), c - n, c >= n); }
-fn region_run(r: Region, run: i32) -> vec2<u32> {
-  let n = vec3<i32>(m.cells.xyz);
-  let along = select(1, r.size.x, SPLIT == 2);      // cell by cell on a periodic axis
-  let row = run / along;
-  let y = wrapped(r.low.y + row % r.size.y, n.y);
-  let z = wrapped(r.low.z + row / r.size.y, n.z);
-  let base = r.bins + (u32(z) * m.cells.y + u32(y)) * m.cells.x;
-  if (SPLIT == 2) {
-    let x = base + u32(wrapped(r.low.x + run % along, n.x));
-    return vec2<u32>(starts[x], starts[x + 1u]);
-  }
-  return vec2<u32>(starts[base + u32(r.low.x)], starts[base + u32(r.low.x + r.size.x)]);
-}
-fn region_next(r: ptr<function, Region>) -> bool {
-  (*r).at += 1u;
-  while ((*r).at >= (*r).end) {
-    (*r).run += 1;
-    if ((*r).run >= (*r).size.y * (*r).size.z * select(1, (*r).size.x, SPLIT == 2)) { return false; }
-    let run = region_run(*r, (*r).run);
-    (*r).at = run.x;
-    (*r).end = run.y;
-  }
-  return true;
-}
-
-// Agents of a flock in the cells within a distance; as Region.
-fn agent_region(x: vec3<f32>, radius: f32, flock: u32) -> Region {
-  let n = vec3<i32>(crowd.cells.xyz);
-  let a = span(x.x, radius, crowd.origin.x, crowd.per_cell.x, n.x, m.period.x);
-  var b = span(x.y, radius, crowd.origin.y, crowd.per_cell.y, n.y, m.period.y);
-  if (FLAT) { b = vec2<i32>(0, 1); }
-  let c = span(x.z, radius, crowd.origin.z, crowd.per_cell.z, n.z, m.period.z);
-  return Region(vec3<i32>(a.x, b.x, c.x), vec3<i32>(a.y, b.y, c.y), flock * crowd.cells.w, -1, 0u, 0u);
-}
-fn agent_run(r: Region, run: i32) -> vec2<u32> {
-  let n = vec3<i32>(crowd.cells.xyz);
-  let along = select(1, r.size.x, SPLIT == 2);
-  let row = run / along;
-  let y = wrapped(r.low.y + row % r.size.y, n.y);
-  let z = wrapped(r.low.z + row / r.size.y, n.z);
-  let base = r.bins + (u32(z) * crowd.cells.y + u32(y)) * crowd.cells.x;
-  if (SPLIT == 2) {
-    let x = base + u32(wrapped(r.low.x + run % along, n.x));
-    return vec2<u32>(agent_starts[x], agent_starts[x + 1u]);
-  }
-  return vec2<u32>(agent_starts[base + u32(r.low.x)], agent_starts[base + u32(r.low.x + r.size.x)]);
-}
-fn agent_next(r: ptr<function, Region>) -> bool {
-  (*r).at += 1u;
-  while ((*r).at >= (*r).end) {
-    (*r).run += 1;
-    if ((*r).run >= (*r).size.y * (*r).size.z * select(1, (*r).size.x, SPLIT == 2)) { return false; }
-    let run = agent_run(*r, (*r).run);
-    (*r).at = run.x;
-    (*r).end = run.y;
-  }
-  return true;
-}
 
 // Cosine and sine of an angle that a turn may reach; none is too large from half a turn on.
 fn turn_of(angle: f32) -> vec2<f32> {
@@ -427,7 +361,7 @@ fn give(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u3
     if (rule.matter.x == 0.0) { continue; }
     let reach = select(1.25 * rule.body.z, m.upper.w, fluid);
     var near = agent_region(x, reach, f);
-    while (agent_next(&near)) {
+    while (agent_region_next(&near)) {
       let a = agents[near.at];
       let d = apart(a.x.xyz, x);
       let r_sq = dot(d, d);

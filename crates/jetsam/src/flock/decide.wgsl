@@ -99,7 +99,7 @@ fn perceive(i: u32, own: u32) -> Perceived {
     if (relation == 1u || (relation == SCHOOL && rule.count.z > 0u)) { continue; }
     let reach = select(rule.sense.x, rule.radii.w, relation == SCHOOL);
     var near = agent_region(x, reach, f);
-    while (agent_next(&near)) {
+    while (agent_region_next(&near)) {
       let other = agents[near.at];
       let d = apart(x, other.x.xyz);
       let r_sq = dot(d, d);
@@ -133,7 +133,7 @@ fn add_nearest(s: ptr<function, Perceived>, i: u32, rule: Rule) {
       if (((rule.kind.w >> (2u * f)) & 3u) != SCHOOL) { continue; }
       all += crowd.rules[f].kind.z;
       var near = agent_region(x, reach, f);
-      while (agent_next(&near)) {
+      while (agent_region_next(&near)) {
         let j = near.at;
         let d = apart(x, agents[j].x.xyz);
         let r_sq = dot(d, d);

@@ -45,7 +45,9 @@ pub struct OnGpu {
     known: f64,
     /// A drift was made since the last sort.
     drifted: bool,
-    fault: Option<GpuError>,
+    fault: OnceLock<GpuError>,
+    /// What the last step left behind, for the length of the next.
+    last: Sums,
     flows: Flows,
 }
 
@@ -119,7 +121,8 @@ impl OnGpu {
             coming: VecDeque::new(),
             known: 0.0,
             drifted: false,
-            fault: None,
+            fault: OnceLock::new(),
+            last: Sums::default(),
             flows: Flows::default(),
         }
     }
@@ -167,14 +170,19 @@ impl OnGpu {
 
     /// Does some work unless something went wrong before, and notes what goes wrong.
     fn attempt<T>(&mut self, work: impl FnOnce(&Gpu, &Ready) -> Result<T, GpuError>) -> Option<T> {
-        let ready = self.ready.as_ref().filter(|_| self.fault.is_none())?;
+        let ready = self.ready.as_ref().filter(|_| self.fault().is_none())?;
         match self.gpu.attempt(|| work(&self.gpu, ready)) {
             Ok(value) => Some(value),
             Err(fault) => {
-                self.fault = Some(fault);
+                self.fail(fault);
                 None
             }
         }
+    }
+
+    /// Notes what went wrong; the first fault counts.
+    fn fail(&self, fault: GpuError) {
+        self.fault.get_or_init(|| fault);
     }
 
     fn write_clock(&mut self, clock: Clock) {
@@ -195,6 +203,7 @@ impl OnGpu {
             }
         }
         if let Some(last) = sums.last() {
+            self.last = *last;
             self.clock.live = last.count[0];
             self.clock.fastest = last.step[2];
         }
@@ -216,7 +225,7 @@ impl Backend for OnGpu {
         self.flows = Flows::of(model);
         self.drifted = false;
         if let Err(fault) = self.prepare(model, &state) {
-            self.fault = Some(fault);
+            self.fail(fault);
         }
         let live = state.particles.count[0] as u32;
         (self.coming, self.known) = (VecDeque::new(), 0.0);
@@ -306,7 +315,7 @@ impl Backend for OnGpu {
     }
 
     fn queue(&mut self, model: &Model, request: Request) -> Option<Batch> {
-        if model.paths.iter().any(Option::is_some) || !model.shakes.is_empty() || self.fault.is_some() {
+        if model.paths.iter().any(Option::is_some) || !model.shakes.is_empty() || self.fault().is_some() {
             return None;
         }
         self.present = OnceLock::new();
@@ -366,9 +375,10 @@ impl Backend for OnGpu {
     fn download(&self) -> &State {
         self.present.get_or_init(|| {
             let mut state = self.start.clone();
-            if let Some(ready) = self.ready.as_ref().filter(|_| self.fault.is_none()) {
-                // a fault shows at the next step
-                let _ = self.gpu.attempt(|| ready.buffers.download(&self.gpu, ready.sizes, &mut state));
+            if let Some(ready) = self.ready.as_ref().filter(|_| self.fault().is_none()) {
+                if let Err(fault) = self.gpu.attempt(|| ready.buffers.download(&self.gpu, ready.sizes, &mut state)) {
+                    self.fail(fault);
+                }
             }
             state
         })
@@ -379,7 +389,7 @@ impl Backend for OnGpu {
     }
 
     fn fault(&self) -> Option<&GpuError> {
-        self.fault.as_ref()
+        self.fault.get()
     }
 }
 
@@ -421,8 +431,13 @@ impl OnGpu {
         let mut state = self.download().clone();
         state.particles.grow(more);
         if let Err(fault) = self.prepare(model, &state) {
-            self.fault = Some(fault);
+            self.fail(fault);
         }
+        let last = self.last;
+        self.attempt(|gpu, ready| {
+            gpu.queue.write_buffer(ready.buffers.log(), 0, bytemuck::bytes_of(&last));
+            Ok(())
+        });
         self.start = state;
     }
 

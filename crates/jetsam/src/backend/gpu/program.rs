@@ -211,15 +211,30 @@ pub fn text(model: &Model) -> String {
     for part in TEXTS {
         text.push_str(part);
     }
-    text.push_str(&scan("scan", ["counts", "starts", "blocks"], "bins_of(STATIC)"));
-    text.push_str(&scan("agent_scan", ["agent_counts", "agent_starts", "agent_blocks"], "agent_total()"));
+    let scan = include_str!("scan.wgsl");
+    let [name, counts, starts, blocks, total] = ["NAME", "COUNTS", "STARTS", "BLOCKS", "TOTAL"];
+    let all = "bins_of(STATIC)";
+    text += &filled(scan, &[(name, "scan"), (counts, "counts"), (starts, "starts"), (blocks, "blocks"), (total, all)]);
+    let of_agents = [
+        (name, "agent_scan"),
+        (counts, "agent_counts"),
+        (starts, "agent_starts"),
+        (blocks, "agent_blocks"),
+        (total, "agent_total()"),
+    ];
+    text += &filled(scan, &of_agents);
+    let region = include_str!("region.wgsl");
+    let (grid, first) = ("GRID", "FIRST");
+    text += &filled(region, &[(name, "region"), (grid, "m"), (starts, "starts"), (first, "bins_of(number)")]);
+    let of_agents =
+        [(name, "agent_region"), (grid, "crowd"), (starts, "agent_starts"), (first, "number * crowd.cells.w")];
+    text += &filled(region, &of_agents);
     text
 }
 
-/// The kernels of a scan.
-fn scan(name: &str, [counts, starts, blocks]: [&str; 3], total: &str) -> String {
-    let text = include_str!("scan.wgsl").split_once("\n\n").map_or("", |t| t.1);
-    let names = [("NAME", name), ("COUNTS", counts), ("STARTS", starts), ("BLOCKS", blocks), ("TOTAL", total)];
+/// A template, its head left out and the names in it replaced.
+fn filled(template: &str, names: &[(&str, &str)]) -> String {
+    let text = template.split_once("\n\n").map_or("", |t| t.1);
     names.iter().fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
 }
 

@@ -97,40 +97,40 @@ impl Buffers {
         let continuity = model.solver.density == Density::Continuity;
         let carried = model.solver.xsph > 0.0 || model.solver.shifting > 0.0 || continuity;
         let mirrored = if model.no_slip { slots as usize } else { 0 };
-        let make = |what: &'static str, bytes: usize| storage(gpu, what, bytes);
+        let make = |what: &'static str, count: usize, size: usize| storage(gpu, what, count, size);
         let buffers = vec![
             uniform(gpu, &layout::constants(model, sizes))?,
-            make("time", size_of::<layout::Clock>())?,
-            make("particles", all * size_of::<Record>())?,
-            make("identities", all * 8)?,
-            make("forces", all * 16)?,
-            make("forces of the step before", fluids as usize * 16)?,
-            make("drifted particles", (fluids + rigid) as usize * size_of::<Drifted>())?,
-            make("cells", (sizes.bins() as usize + walls.starts.len()) * 4)?,
-            make("counts of cells", sizes.bins() as usize * 4)?,
-            make("order of particles", (fluids + rigid) as usize * 4)?,
-            make("blocks of cells", sizes.blocks() as usize * 4)?,
-            make("bodies", sizes.bodies as usize * size_of::<GpuBody>())?,
-            make("slots of bodies", slots as usize * size_of::<Slot>())?,
-            make("contacts of bodies", slots as usize * size_of::<Touch>())?,
-            make("mirrored velocities", mirrored * 16)?,
-            make("parts of bodies", parts.len() * 16)?,
-            make("sums of parts", parts.len() * 96)?,
-            make("carried velocities", fluid_or(carried) * 16)?,
-            make("rates of density", fluid_or(continuity || mortal(model)) * 16)?,
-            make("gradients", fluid_or(model.wants_gradients()) * 16)?,
-            make("vorticities", fluid_or(model.wants_gradients()) * 16)?,
-            make("sums of groups", (sizes.groups + agents.div_ceil(128)) as usize * size_of::<Sums>())?,
-            make("statistics", (logged + 1) * size_of::<Sums>())?,
-            make("births", listed * size_of::<Birth>())?,
-            make("forces of hoses", fluid_or(hoses(model).next().is_some()) * 16)?,
-            make("agents", sizes.agents as usize * size_of::<Agent>())?,
-            make("agents before the sort", sizes.agents as usize * size_of::<Agent>())?,
-            make("cells of agents", (sizes.agent_cells as usize + 2) * 4)?,
-            make("counts of cells of agents", (sizes.agent_cells as usize + 2) * 4)?,
-            make("order of agents", sizes.agents as usize * 4)?,
-            make("blocks of cells of agents", ((sizes.agent_cells + 2).div_ceil(BLOCK)) as usize * 4)?,
-            make("flocks", size_of::<Crowd>() + model.flocks.len() * size_of::<Rule>())?,
+            make("time", 1, size_of::<layout::Clock>())?,
+            make("particles", all, size_of::<Record>())?,
+            make("identities", all, 8)?,
+            make("forces", all, 16)?,
+            make("forces of the step before", fluids as usize, 16)?,
+            make("drifted particles", (fluids + rigid) as usize, size_of::<Drifted>())?,
+            make("cells", sizes.bins() as usize + walls.starts.len(), 4)?,
+            make("counts of cells", sizes.bins() as usize, 4)?,
+            make("order of particles", (fluids + rigid) as usize, 4)?,
+            make("blocks of cells", sizes.blocks() as usize, 4)?,
+            make("bodies", sizes.bodies as usize, size_of::<GpuBody>())?,
+            make("slots of bodies", slots as usize, size_of::<Slot>())?,
+            make("contacts of bodies", slots as usize, size_of::<Touch>())?,
+            make("mirrored velocities", mirrored, 16)?,
+            make("parts of bodies", parts.len(), 16)?,
+            make("sums of parts", parts.len(), 96)?,
+            make("carried velocities", fluid_or(carried), 16)?,
+            make("rates of density", fluid_or(continuity || mortal(model)), 16)?,
+            make("gradients", fluid_or(model.wants_gradients()), 16)?,
+            make("vorticities", fluid_or(model.wants_gradients()), 16)?,
+            make("sums of groups", (sizes.groups + agents.div_ceil(128)) as usize, size_of::<Sums>())?,
+            make("statistics", logged + 1, size_of::<Sums>())?,
+            make("births", listed, size_of::<Birth>())?,
+            make("forces of hoses", fluid_or(hoses(model).next().is_some()), 16)?,
+            make("agents", sizes.agents as usize, size_of::<Agent>())?,
+            make("agents before the sort", sizes.agents as usize, size_of::<Agent>())?,
+            make("cells of agents", sizes.agent_cells as usize + 2, 4)?,
+            make("counts of cells of agents", sizes.agent_cells as usize + 2, 4)?,
+            make("order of agents", sizes.agents as usize, 4)?,
+            make("blocks of cells of agents", ((sizes.agent_cells + 2).div_ceil(BLOCK)) as usize, 4)?,
+            make("flocks", 1, size_of::<Crowd>() + model.flocks.len() * size_of::<Rule>())?,
         ];
         let buffers = Self { all: buffers };
         buffers.fill(gpu, model, state, &walls, &parts, sizes);
@@ -313,11 +313,12 @@ impl Buffers {
 }
 
 /// A buffer for kernels to read and write; never empty, and full of zeros.
-fn storage(gpu: &Gpu, what: &'static str, bytes: usize) -> Result<wgpu::Buffer, GpuError> {
-    gpu.info.holds(what, bytes as u64)?;
+fn storage(gpu: &Gpu, what: &'static str, count: usize, size: usize) -> Result<wgpu::Buffer, GpuError> {
+    let bytes = (count * size) as u64;
+    gpu.info.holds_all(what, count as u64, bytes)?;
     Ok(gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(what),
-        size: (bytes as u64).max(512),
+        size: bytes.max(512),
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     }))
@@ -327,7 +328,13 @@ fn uniform(gpu: &Gpu, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
     let limit = gpu.device.limits().max_uniform_buffer_binding_size;
     if bytes.len() as u64 > limit {
         let device = gpu.info.name.clone();
-        return Err(GpuError::Limit { what: "constants of the scene", needs: bytes.len() as u64, limit, device });
+        return Err(GpuError::Limit {
+            what: "constants of the scene",
+            count: 0,
+            needs: bytes.len() as u64,
+            limit,
+            device,
+        });
     }
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("constants"),
