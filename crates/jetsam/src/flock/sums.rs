@@ -92,6 +92,16 @@ fn add(to: &mut [Lanes; 3], weight: &Lanes, vector: [&Lanes; 3]) {
     }
 }
 
+/// Adds the vectors of those whose weight is 1, not 0: the products are exact, so that fused or not it is the same number.
+#[inline(always)]
+fn add_those<S: Simd>(simd: S, to: &mut [Lanes; 3], weight: &Lanes, vector: [&Lanes; 3]) {
+    let weight = f32x16::load_array_ref(simd, weight);
+    for a in 0..3 {
+        let sum = f32x16::load_array_ref(simd, &to[a]);
+        weight.mul_add(f32x16::load_array_ref(simd, vector[a]), sum).store_array(&mut to[a]);
+    }
+}
+
 /// Sums over those an agent schools with. `unbounded`: the tile holds topological neighbours, whatever their distance.
 #[inline(always)]
 pub fn school<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, sums: &mut Sums) {
@@ -159,8 +169,8 @@ fn reynolds_of<S: Simd, const ALIKE: bool, const ALL_AROUND: bool>(
                     drawn[l] *= seen[l];
                 }
             }
-            add(&mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
-            add(&mut wide.place, &drawn, [&d[0], &d[1], &d[2]]);
+            add_those(simd, &mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
+            add_those(simd, &mut wide.place, &drawn, [&d[0], &d[1], &d[2]]);
             for l in 0..LANES {
                 wide.aligned[l] += aligned[l];
                 if !ALIKE {
