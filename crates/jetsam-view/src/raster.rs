@@ -5,12 +5,14 @@
 
 use crate::camera::View;
 use crate::{Ball, Camera, Facet};
-use glam::{IVec2, Vec2, Vec3, vec2};
+use fearless_simd::{Level, dispatch};
+use glam::{Vec2, Vec3, vec2};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Edge of a tile in samples.
 const TILE: usize = 64;
+const SIDE: u32 = TILE as u32;
 /// What a sample shows when it shows nothing at all.
 pub const NOTHING: u32 = u32::MAX;
 /// What a sample shows when it shows the ground.
@@ -23,7 +25,7 @@ pub struct Raster {
     pub height: usize,
     /// Tiles per row of tiles.
     across: usize,
-    /// m along the line of sight, infinite where there is nothing.
+    /// m along the line of sight, infinite where there is nothing; one more, infinite, stands for what is beside the raster.
     depth: Vec<f32>,
     /// Index of a shape, or [`NOTHING`] or [`GROUND`].
     shows: Vec<u32>,
@@ -95,11 +97,13 @@ impl Raster {
         }
 
         let samples = across * down * TILE * TILE;
-        let (mut depth, mut shows) = (vec![f32::INFINITY; samples], vec![NOTHING; samples]);
-        let tiles = depth.par_chunks_mut(TILE * TILE).zip(shows.par_chunks_mut(TILE * TILE));
+        let (mut depth, mut shows) = (vec![f32::INFINITY; samples + 1], vec![NOTHING; samples]);
+        let level = Level::new();
+        let tiles = depth[..samples].par_chunks_mut(TILE * TILE).zip(shows.par_chunks_mut(TILE * TILE));
         tiles.with_max_len(1).enumerate().for_each(|(t, (depth, shows))| {
             let splats = list[ends[t]..ends[t + 1]].iter().map(|i| &splats[*i as usize]);
-            Tile { depth, shows }.draw(splats, &view, [t % across * TILE, t / across * TILE], ground);
+            let corner = [t % across * TILE, t / across * TILE];
+            dispatch!(level, _simd => Tile { depth, shows }.draw(splats, &view, corner, ground));
         });
         Raster { view, width, height, across, depth, shows }
     }
@@ -114,11 +118,23 @@ impl Raster {
         (self.depth[i], self.shows[i])
     }
 
-    /// Depth (m) at a sample, infinite where there is nothing and beside the raster.
-    #[inline]
-    pub fn depth(&self, p: IVec2) -> f32 {
-        let (x, y) = (p.x as usize, p.y as usize); // a negative one becomes huge
-        if x < self.width && y < self.height { self.depth[self.index(x, y)] } else { f32::INFINITY }
+    /// Depths (m) at samples given by column and row, infinite where there is nothing and beside the raster.
+    #[inline(always)]
+    pub fn depths<const N: usize>(&self, columns: &[f32; N], rows: &[f32; N]) -> [f32; N] {
+        let (width, height, across) = (self.width as u32, self.height as u32, self.across as u32);
+        let beside = self.depth.len() as u32 - 1;
+        let mut index = [0; N];
+        for k in 0..N {
+            // a negative one becomes huge
+            let (x, y) = (columns[k] as i32 as u32, rows[k] as i32 as u32);
+            let tile = (y / SIDE * across + x / SIDE).wrapping_mul(SIDE * SIDE);
+            index[k] = if x < width && y < height { tile + (y % SIDE * SIDE + x % SIDE) } else { beside };
+        }
+        let mut depths = [0.0; N];
+        for k in 0..N {
+            depths[k] = self.depth[index[k] as usize];
+        }
+        depths
     }
 }
 
@@ -176,6 +192,7 @@ impl Splat {
 
 impl Tile<'_> {
     /// Draws the splats, which come front to back, into the tile whose first sample is `corner`.
+    #[inline(always)]
     fn draw<'a>(self, splats: impl Iterator<Item = &'a Splat>, view: &View, corner: [usize; 2], ground: Option<f32>) {
         let middle = |k: usize, i: usize| (corner[k] + i) as f32 + 0.5;
         let slope_x: [f32; TILE] = std::array::from_fn(|x| view.slope(vec2(middle(0, x), 0.0)).x);

@@ -9,6 +9,7 @@
 
 use crate::raster::{GROUND, NOTHING, Raster};
 use crate::{Camera, Image, color};
+use fearless_simd::{Level, dispatch};
 use glam::{FloatExt, Vec2, Vec3, vec2};
 use rayon::prelude::*;
 
@@ -124,13 +125,9 @@ pub fn render(balls: &[Ball], camera: &Camera, width: usize, height: usize, opti
     let scene = Scene::new(balls, camera, width, height, options);
     let srgb = color::srgb_table();
     let mut rgba = vec![255; width * height * 4];
+    let level = Level::new();
     rgba.par_chunks_mut((width * 4).max(1)).enumerate().for_each(|(y, row)| {
-        for (x, pixel) in row.chunks_exact_mut(4).enumerate() {
-            let linear = scene.shade(x, y).clamp(Vec3::ZERO, Vec3::ONE);
-            for k in 0..3 {
-                pixel[k] = srgb[(linear[k] * 4096.0 + 0.5) as usize];
-            }
-        }
+        dispatch!(level, _simd => scene.shade_row(y, row, &srgb));
     });
     let mut image = Image { width, height, rgba };
     for line in options.lines {
@@ -139,6 +136,8 @@ pub fn render(balls: &[Ball], camera: &Camera, width: usize, height: usize, opti
     image
 }
 
+/// Taps into depths, for shadows and for the sky: loops over as many become vector instructions.
+const TAPS: usize = 16;
 /// Samples of a pixel along each side.
 const FINE: usize = 2;
 /// Edge of the light's raster.
@@ -154,8 +153,8 @@ struct Scene<'a> {
     light: Vec3,
     /// Mean radius of a ball, m: how soft shadows on the ground and on meshes are.
     grain: f32,
-    shadow_taps: [Vec2; 8],
-    sky_taps: [Vec2; 14],
+    /// Columns and rows of taps on the unit disc.
+    taps: [[f32; TAPS]; 2],
 }
 
 impl<'a> Scene<'a> {
@@ -180,12 +179,23 @@ impl<'a> Scene<'a> {
             lit: Raster::new(balls, facets, None, &lamp, LIGHT, LIGHT),
             light,
             grain: if mean_radius > 0.0 { mean_radius } else { 0.01 * (high - low).length() },
-            shadow_taps: spiral(),
-            sky_taps: spiral(),
+            taps: spiral(),
+        }
+    }
+
+    /// Colours row `y` of the picture.
+    #[inline(always)]
+    fn shade_row(&self, y: usize, row: &mut [u8], srgb: &[u8]) {
+        for (x, pixel) in row.chunks_exact_mut(4).enumerate() {
+            let linear = self.shade(x, y).clamp(Vec3::ZERO, Vec3::ONE);
+            for k in 0..3 {
+                pixel[k] = srgb[(linear[k] * 4096.0 + 0.5) as usize];
+            }
         }
     }
 
     /// Linear colour of a pixel: the mean of its samples. Samples that show the same thing are shaded once, in their middle.
+    #[inline(always)]
     fn shade(&self, x: usize, y: usize) -> Vec3 {
         let samples: [_; FINE * FINE] = std::array::from_fn(|i| {
             let (x, y) = (FINE * x + i % FINE, FINE * y + i / FINE);
@@ -206,6 +216,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Linear colour of what is shown at a raster position.
+    #[inline(always)]
     fn color(&self, place: Vec2, depth: f32, shows: u32) -> Vec3 {
         let fall = place.y / self.seen.height as f32;
         let background = Vec3::from(self.options.above).lerp(self.options.below.into(), fall);
@@ -237,35 +248,51 @@ impl<'a> Scene<'a> {
     }
 
     /// Share of the light's rays that reach a point, softened over about the distance `grain`: 0 in shadow, 1 in the sun.
+    #[inline(always)]
     fn sunshine(&self, point: Vec3, grain: f32) -> f32 {
         let view = &self.lit.view;
         let local = view.local(point);
-        let (middle, reach) = (view.pixel(local), 2.0 * grain * view.focal / local.z);
+        let (_, _, depths) = self.tap(&self.lit, view.pixel(local), 2.0 * grain * view.focal / local.z);
         // Shapes shade what lies two radii behind them: a surface of balls does not shade itself.
-        let free = |tap: &Vec2| self.lit.depth((middle + reach * *tap).as_ivec2()) > local.z - 2.0 * grain;
-        let count: u32 = self.shadow_taps.iter().map(|tap| u32::from(free(tap))).sum();
-        count as f32 / self.shadow_taps.len() as f32
+        let mut free = [0.0; TAPS];
+        for t in 0..TAPS {
+            free[t] = if depths[t] > local.z - 2.0 * grain { 1.0 } else { 0.0 };
+        }
+        sum(free) / TAPS as f32
     }
 
     /// Share of the sky that reaches a point past its surroundings within a few `grain`: 1 in the open, towards 0 in a crevice.
+    #[inline(always)]
     fn openness(&self, place: Vec2, depth: f32, normal: Vec3, grain: f32) -> f32 {
         let view = &self.seen.view;
         let range = 5.0 * grain;
-        let reach = (range * view.focal / depth).min(96.0);
-        let mut blocked = 0.0;
+        let (columns, rows, depths) = self.tap(&self.seen, place, (range * view.focal / depth).min(96.0));
         let origin = (depth * view.slope(place)).extend(depth);
         let normal = Vec3::new(normal.dot(view.right), normal.dot(view.up), normal.dot(view.forward));
-        for tap in self.sky_taps {
+        let (inverse, closest) = (1.0 / view.focal, 0.01 * grain * grain);
+        let mut blocked = [0.0; TAPS];
+        for t in 0..TAPS {
             // Without branches, which would be mispredicted: an infinite depth comes to a fade of nought.
-            let tap = (place + reach * tap).as_ivec2();
-            let depth = self.seen.depth(tap);
-            let away = (depth * view.slope(tap.as_vec2() + 0.5)).extend(depth) - origin;
-            let square = away.length_squared();
+            let x = depths[t] * (columns[t] + 0.5 - view.middle.x) * inverse - origin.x;
+            let y = depths[t] * (view.middle.y - rows[t] - 0.5) * inverse - origin.y;
+            let z = depths[t] - origin.z;
+            let square = x * x + y * y + z * z;
             let fade = (1.0 - square / (range * range)).max(0.0);
-            let rise = away.dot(normal) / (square + 0.01 * grain * grain).sqrt();
-            blocked += fade * (rise - 0.1).max(0.0);
+            let rise = (x * normal.x + y * normal.y + z * normal.z) / (square + closest).sqrt();
+            blocked[t] = fade * (rise - 0.1).max(0.0);
         }
-        (1.0 - 2.0 * blocked / self.sky_taps.len() as f32).max(0.0)
+        (1.0 - 2.0 * sum(blocked) / TAPS as f32).max(0.0)
+    }
+
+    /// Columns, rows and depths (m) of the samples around a place of a raster, up to `reach` samples away.
+    #[inline(always)]
+    fn tap(&self, raster: &Raster, place: Vec2, reach: f32) -> ([f32; TAPS], [f32; TAPS], [f32; TAPS]) {
+        let (mut columns, mut rows) = ([0.0; TAPS], [0.0; TAPS]);
+        for t in 0..TAPS {
+            columns[t] = (place.x + reach * self.taps[0][t]).floor();
+            rows[t] = (place.y + reach * self.taps[1][t]).floor();
+        }
+        (columns, rows, raster.depths(&columns, &rows))
     }
 
     /// Blends a line into the picture. Each step along its longer direction covers the two or three pixels across it.
@@ -307,7 +334,21 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Points spread evenly over the unit disc, on a spiral of golden angles.
-fn spiral<const N: usize>() -> [Vec2; N] {
-    std::array::from_fn(|i| ((i as f32 + 0.5) / N as f32).sqrt() * Vec2::from_angle(2.399_963_2 * i as f32))
+/// Columns and rows of points spread evenly over the unit disc, on a spiral of golden angles.
+fn spiral() -> [[f32; TAPS]; 2] {
+    let point = |i: usize| ((i as f32 + 0.5) / TAPS as f32).sqrt() * Vec2::from_angle(2.399_963_2 * i as f32);
+    [std::array::from_fn(|i| point(i).x), std::array::from_fn(|i| point(i).y)]
+}
+
+/// Sum, in an order that suits vectors.
+#[inline(always)]
+fn sum(mut x: [f32; TAPS]) -> f32 {
+    let mut half = TAPS / 2;
+    while half > 0 {
+        for t in 0..half {
+            x[t] += x[t + half];
+        }
+        half /= 2;
+    }
+    x[0]
 }

@@ -143,12 +143,14 @@ fn lines_are_hidden_by_what_is_nearer() {
 }
 
 #[test]
-fn a_ball_casts_a_shadow_on_the_ground() {
+fn a_plate_of_balls_casts_a_shadow_on_the_ground() {
     let options = Options { ground: Some(-0.5), light: Vec3::Z, ..Options::default() };
-    let (image, empty) = (draw(&[ball(Vec3::ZERO, 0.2, RED)], &options), draw(&[], &options));
+    let at = |i: i32| 0.05 * i as f32;
+    let plate = (-4..=4).flat_map(|i| (-4..=4).map(move |j| ball(vec3(at(i), at(j), 0.0), 0.03, RED)));
+    let (image, empty) = (draw(&plate.collect::<Vec<_>>(), &options), draw(&[], &options));
     let below = camera().project(vec3(0.0, 0.0, -0.5), WIDTH, HEIGHT).unwrap();
     let (x, y) = (below.x as usize, below.y as usize);
-    assert!(image.pixel(x, y)[1] + 20 < empty.pixel(x, y)[1], "it is dark under the ball");
+    assert!(image.pixel(x, y)[1] + 20 < empty.pixel(x, y)[1], "it is dark under the plate");
     assert_eq!(image.pixel(x + 60, y), empty.pixel(x + 60, y), "and bright beside it");
 }
 

@@ -4,8 +4,8 @@ mod common;
 
 use common::{scene, stirred, world};
 use glam::DVec3;
-use jetsam::state::Kind;
 use jetsam::World;
+use jetsam::state::Kind;
 
 #[test]
 fn action_is_reaction_at_every_step() {

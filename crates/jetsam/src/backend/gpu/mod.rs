@@ -375,10 +375,10 @@ impl Backend for OnGpu {
     fn download(&self) -> &State {
         self.present.get_or_init(|| {
             let mut state = self.start.clone();
-            if let Some(ready) = self.ready.as_ref().filter(|_| self.fault().is_none()) {
-                if let Err(fault) = self.gpu.attempt(|| ready.buffers.download(&self.gpu, ready.sizes, &mut state)) {
-                    self.fail(fault);
-                }
+            if let Some(ready) = self.ready.as_ref().filter(|_| self.fault().is_none())
+                && let Err(fault) = self.gpu.attempt(|| ready.buffers.download(&self.gpu, ready.sizes, &mut state))
+            {
+                self.fail(fault);
             }
             state
         })
