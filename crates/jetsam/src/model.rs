@@ -454,6 +454,14 @@ impl Model {
         self.flocks = flocks;
     }
 
+    /// No vector `V_j grad_i W_ij` between particles is longer (1/m). Bodies' particles are at most a quarter larger than fluids'.
+    pub fn longest_link(&self) -> f32 {
+        let kernel = self.kernel.force();
+        let part = |k: u16| f32::from(k) / 256.0;
+        let steepest = (1..=256).map(|k| (kernel.g(part(k)) * part(k)).abs()).fold(0.0, f32::max);
+        1.3 * (self.volume * self.support) as f32 * self.factors.g.abs() * steepest
+    }
+
     /// Spacings that the fastest particle moves in a step of implicit pressure (E29).
     fn courant_flow(&self) -> f64 {
         self.solver.courant_flow.unwrap_or(if self.solver.pressure == Pressure::Pbf { 1.0 } else { 0.6 })

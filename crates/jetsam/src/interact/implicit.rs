@@ -32,12 +32,12 @@ pub fn accelerate<S: Simd>(
             let other = gather_one(near);
             for l in 0..LANES {
                 let both = own + other[l];
-                total[0][l] += both * e[0][l];
-                total[1][l] += both * e[1][l];
-                total[2][l] += both * e[2][l];
+                total[0][l] += both * f32::from(e[0][l]);
+                total[1][l] += both * f32::from(e[1][l]);
+                total[2][l] += both * f32::from(e[2][l]);
             }
         }
-        let fluids = Vec3::new(sum(simd, &total[0]), sum(simd, &total[1]), sum(simd, &total[2]));
+        let fluids = links.unit * Vec3::new(sum(simd, &total[0]), sum(simd, &total[1]), sum(simd, &total[2]));
         let solids = 2.0 * own * node.solid + hold[first + k] * node.pull;
         let a = -node.inverse_rho * (fluids + solids);
         *out = [a.x, a.y, a.z, 0.0];
@@ -54,10 +54,11 @@ pub fn rates<S: Simd>(simd: S, links: &Links, nodes: &[Node], u: &[[f32; 4]], fi
         for (near, e) in linked.all(k) {
             let other = gather_vectors(simd, near);
             for l in 0..LANES {
-                total[l] += other[0][l] * e[0][l] + other[1][l] * e[1][l] + other[2][l] * e[2][l];
+                let [x, y, z] = [e[0][l], e[1][l], e[2][l]].map(f32::from);
+                total[l] += other[0][l] * x + other[1][l] * y + other[2][l] * z;
             }
         }
-        *out = node.all.dot(Vec3::new(x, y, z)) - sum(simd, &total);
+        *out = node.all.dot(Vec3::new(x, y, z)) - links.unit * sum(simd, &total);
     }
 }
 

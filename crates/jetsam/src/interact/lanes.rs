@@ -200,17 +200,23 @@ impl<'a, T> Listed<'a, T> {
     }
 }
 
-/// Sixteen neighbours of a particle and a vector to each, on cache lines of their own.
+/// Sixteen whole numbers of 16 bits each.
+pub type Counts = [i16; LANES];
+
+/// Sixteen neighbours of a particle and a vector to each: 160 bytes.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
+#[repr(C, align(32))]
 struct Link {
     index: [u32; LANES],
-    e: [Lanes; 3],
+    e: [Counts; 3],
 }
 
-/// Neighbours of a chunk of particles with a vector to each, kept while a solver iterates: one stream to read.
+/// Neighbours of a chunk of particles with a vector to each, kept while a solver iterates: one stream to read, which rounds wait for. So
+/// the vectors are whole numbers of `unit`, the same for all particles, that those of both sides of a pair stay opposite.
 #[derive(Clone, Debug, Default)]
 pub struct Links {
+    /// What a component of a vector counts (1/m).
+    pub unit: f32,
     blocks: Vec<Link>,
     used: usize,
     /// Begin of a particle's blocks, end of those of fluids, end of all.
@@ -219,12 +225,13 @@ pub struct Links {
 }
 
 impl Links {
-    /// Forgets everything, and makes room for the links of a list so long.
+    /// Forgets everything, and makes room for the links of a list so long, with vectors whose components are no larger than `largest`.
     #[inline(always)]
-    pub fn clear(&mut self, list: usize) {
+    pub fn clear(&mut self, list: usize, largest: f32) {
         if self.blocks.len() < list / LANES {
-            self.blocks.resize(list / LANES, Link { index: [0; LANES], e: [[0.0; LANES]; 3] });
+            self.blocks.resize(list / LANES, Link { index: [0; LANES], e: [[0; LANES]; 3] });
         }
+        self.unit = largest / f32::from(i16::MAX);
         self.used = 0;
         self.spans.clear();
         self.largest = [0; LANES];
@@ -254,7 +261,7 @@ impl Links {
 
     /// Adds sixteen neighbours of the particle begun last.
     #[inline(always)]
-    pub fn push<S: Simd>(&mut self, simd: S, index: &[u32; LANES], e: &[Lanes; 3]) {
+    pub fn push<S: Simd>(&mut self, simd: S, index: &[u32; LANES], e: &[Counts; 3]) {
         self.largest = u32x16::load_array_ref(simd, &self.largest).max(u32x16::load_array_ref(simd, index)).to_array();
         self.blocks[self.used] = Link { index: *index, e: *e };
         self.used += 1;
@@ -282,23 +289,39 @@ pub struct Linked<'a, T> {
 impl<'a, T> Linked<'a, T> {
     /// The fluids linked to particle `k` of the chunk, and the vectors to them.
     #[inline(always)]
-    pub fn fluids(self, k: usize) -> impl Iterator<Item = (Near<'a, T>, &'a [Lanes; 3])> {
+    pub fn fluids(self, k: usize) -> impl Iterator<Item = (Near<'a, T>, &'a [Counts; 3])> {
         let [begin, end, _] = self.links.spans[k];
         self.blocks(begin, end)
     }
 
     /// All that are linked to particle `k` of the chunk.
     #[inline(always)]
-    pub fn all(self, k: usize) -> impl Iterator<Item = (Near<'a, T>, &'a [Lanes; 3])> {
+    pub fn all(self, k: usize) -> impl Iterator<Item = (Near<'a, T>, &'a [Counts; 3])> {
         let [begin, _, end] = self.links.spans[k];
         self.blocks(begin, end)
     }
 
     #[inline(always)]
-    fn blocks(self, begin: u32, end: u32) -> impl Iterator<Item = (Near<'a, T>, &'a [Lanes; 3])> {
+    fn blocks(self, begin: u32, end: u32) -> impl Iterator<Item = (Near<'a, T>, &'a [Counts; 3])> {
         let blocks = &self.links.blocks[begin as usize..end as usize];
         blocks.iter().map(move |b| (Near { values: self.values, index: &b.index }, &b.e))
     }
+}
+
+/// Added to a number, leaves its nearest whole number in the last bits.
+const ROUND: f32 = 12_582_912.0;
+
+/// How often `unit` (given by its inverse) goes into sixteen numbers, and what that many are.
+#[inline(always)]
+pub fn counted(x: &mut Lanes, unit: f32, inverse: f32) -> Counts {
+    let mut counts = [0; LANES];
+    let most = f32::from(i16::MAX);
+    for l in 0..LANES {
+        let shifted = (x[l] * inverse).clamp(-most, most) + ROUND;
+        counts[l] = shifted.to_bits() as i16;
+        x[l] = unit * (shifted - ROUND);
+    }
+    counts
 }
 
 /// Sixteen records side by side.
@@ -398,6 +421,22 @@ fn unzip<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
 mod tests {
     use super::*;
     use fearless_simd::{Level, dispatch};
+
+    #[test]
+    fn counts_of_opposite_numbers_are_opposite() {
+        let unit = 0.013;
+        let numbers: Lanes = std::array::from_fn(|l| (l as f32 - 6.5) * 61.7);
+        let (mut plus, mut minus) = (numbers, numbers.map(|x| -x));
+        let (up, down) = (counted(&mut plus, unit, 1.0 / unit), counted(&mut minus, unit, 1.0 / unit));
+        for l in 0..LANES {
+            assert_eq!(up[l], -down[l]);
+            assert_eq!(plus[l], -minus[l]);
+            let most = f32::from(i16::MAX) * unit;
+            let exact = numbers[l].clamp(-most, most);
+            assert!((plus[l] - exact).abs() <= 0.5001 * unit, "{exact} became {}", plus[l]);
+            assert_eq!(plus[l], unit * f32::from(up[l]));
+        }
+    }
 
     #[test]
     fn gather_transposes() {

@@ -6,7 +6,7 @@
 
 use super::boundary::acceleration;
 use super::density::weights;
-use super::lanes::{LANES, Lanes, Links, Listed, Near, gather, sum};
+use super::lanes::{LANES, Lanes, Links, Listed, Near, counted, gather, sum};
 use super::neighbours::{NeighbourChunk, Runs};
 use super::pairs::wrap_lanes;
 use crate::laws::implicit;
@@ -70,7 +70,7 @@ pub fn chunk<S: Simd, const DENSITY: bool>(
     let model = input.model;
     let listed = Listed::new(simd, input.records, chunk.list());
     let floor = 1e-4 / (model.spacing * model.spacing) as f32;
-    links.clear(chunk.list().len());
+    links.clear(chunk.list().len(), model.longest_link());
     for (k, (runs, node)) in chunk.runs.iter().zip(nodes).enumerate() {
         links.begin();
         let fluid = run::<S, DENSITY, true>(simd, &input, listed, first + k, runs, Kind::Fluid, links);
@@ -120,6 +120,7 @@ fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
     let rho = model.fluids[owner[i] as usize].density;
     let (inverse, factor) = (model.inverse_support(), model.factors.g);
     let pull = rho * input.gravity;
+    let (unit, per_unit) = (links.unit, 1.0 / links.unit);
     let mut sums = Sums::default();
     let mut answer = [1.0 / rho; LANES];
     for near in listed.run(runs.padded(kind)) {
@@ -130,7 +131,12 @@ fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
                 answer[l] = 1.0 / model.fluids[owner[near.index[l] as usize] as usize].density;
             }
         }
-        let e = each_kernel!(model.kernel.force(), K => sixteen(K, factor, inverse, &d, &r_sq, &other.volume));
+        let mut e = each_kernel!(model.kernel.force(), K => sixteen(K, factor, inverse, &d, &r_sq, &other.volume));
+        if kind != Kind::Static {
+            let [x, y, z] = &mut e;
+            let counts = [counted(x, unit, per_unit), counted(y, unit, per_unit), counted(z, unit, per_unit)];
+            links.push(simd, near.index, &counts);
+        }
         for l in 0..LANES {
             sums.e[0][l] += e[0][l];
             sums.e[1][l] += e[1][l];
@@ -153,9 +159,6 @@ fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
             for l in 0..LANES {
                 sums.weight[l] += other.volume[l] * w[l];
             }
-        }
-        if kind != Kind::Static {
-            links.push(simd, near.index, &e);
         }
     }
     // padding is the particle itself: e is zero, W is not
