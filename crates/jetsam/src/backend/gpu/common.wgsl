@@ -73,10 +73,13 @@ struct Body {
   counts: vec4<u32>,      // contacts, deep, first part, parts
 }
 
-struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, slip: vec4<f32>, owner: u32, place: u32, unused: vec2<u32> }
+struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, owner: u32, place: u32, unused: vec2<u32> }
 
 // Of what the force on a body's particle consists.
-struct Touch { fluid: vec4<f32>, contact: vec4<f32>, couple: vec4<f32>, slip: vec4<f32> }
+struct Touch { fluid: vec4<f32>, contact: vec4<f32>, couple: vec4<f32> }
+
+// Slips of the contacts of a slot, as bits; w: slot of the other, GONE behind the last.
+struct Slips { held: array<vec4<u32>, 8> }
 
 // Sums over a part of a body; w: contacts, sharers, deep.
 struct PartSum { force: vec4<f32>, fluid: vec4<f32>, contact: vec4<f32>, torque: vec4<f32>, torque_fluid: vec4<f32>, torque_contact: vec4<f32> }
@@ -143,6 +146,7 @@ struct Sums {
 @group(0) @binding(29) var<storage, read_write> agent_order: array<u32>;
 @group(0) @binding(30) var<storage, read_write> agent_blocks: array<u32>;
 @group(0) @binding(31) var<storage, read_write> crowd: Crowd;
+@group(0) @binding(32) var<storage, read_write> slips: array<Slips>;        // by slot of rigid bodies; then as found in this step
 
 // A flock: as flock::FlockConstants, and its clock. lead: place and velocity of its first agent.
 struct Rule {

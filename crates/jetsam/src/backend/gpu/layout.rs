@@ -5,7 +5,7 @@ use crate::flock::FlockConstants;
 use crate::integrate::sources::DrainRegion;
 use crate::model::Model;
 use crate::scene::{Force, Wall};
-use crate::state::{Body, State};
+use crate::state::{Body, HELD_CONTACTS, State};
 use bytemuck::{Pod, Zeroable};
 use glam::{DQuat, DVec3, Vec3};
 
@@ -96,7 +96,6 @@ pub struct Slot {
     pub offset: V,
     pub normal: V,
     pub facing: V,
-    pub slip: V,
     pub owner: u32,
     pub place: u32,
     pub unused: [u32; 2],
@@ -109,7 +108,13 @@ pub struct Touch {
     pub fluid: V,
     pub contact: V,
     pub couple: V,
-    pub slip: V,
+}
+
+/// Slips of the contacts of a slot, as bits; last the slot of the other.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Slips {
+    pub held: [[u32; 4]; HELD_CONTACTS],
 }
 
 /// Time.
@@ -367,7 +372,6 @@ pub fn slots(state: &State, place: impl Fn(usize) -> u32) -> Vec<Slot> {
         offset: single(b.offset[s], b.record[s].volume),
         normal: with(b.normal[s], 0.0),
         facing: with(b.facing[s], 0.0),
-        slip: with(b.slip.get(s).copied().unwrap_or_default(), 0.0),
         owner: b.owner[s],
         place: place(s),
         unused: [0; 2],
@@ -507,16 +511,29 @@ pub fn to_touch(from: &Touch) -> crate::state::Touch {
         fluid: three(from.fluid),
         contact: three(from.contact),
         couple: three(from.couple),
-        slip: three(from.slip),
+        slips: 0,
         contacts: from.contact[3] as u32,
         sharers: from.fluid[3],
         deep: from.couple[3] as u32,
     }
 }
 
-/// A vector of numbers kernels wrote.
-pub fn vec(v: V) -> Vec3 {
-    Vec3::from(three(v))
+/// Slips of contacts there.
+pub fn slips(from: &crate::state::Slips) -> Slips {
+    let held = |k: usize| {
+        let [x, y, z] = from.slip[k].map(f32::to_bits);
+        [x, y, z, from.with[k]]
+    };
+    Slips { held: std::array::from_fn(held) }
+}
+
+/// Slips of contacts home.
+pub fn to_slips(from: &Slips) -> crate::state::Slips {
+    let mut slips = crate::state::Slips::default();
+    for (k, &[x, y, z, with]) in from.held.iter().take_while(|held| held[3] != crate::state::Slips::NONE).enumerate() {
+        (slips.with[k], slips.slip[k]) = (with, [x, y, z].map(f32::from_bits));
+    }
+    slips
 }
 
 #[cfg(test)]
@@ -554,8 +571,9 @@ mod tests {
         }
         same!("Drifted", Drifted, x, v, push, rate, id, owner);
         same!("Birth", Birth, x, v, room);
-        same!("Slot", Slot, offset, normal, facing, slip, owner, place);
-        same!("Touch", Touch, fluid, contact, couple, slip);
+        same!("Slot", Slot, offset, normal, facing, owner, place);
+        same!("Touch", Touch, fluid, contact, couple);
+        same!("Slips", Slips, held);
         same!(
             "Clock", Clock, dt, dt_before, left, drag, gravity, fastest, running, step, live, bound, own, time,
             elapsed, births, born, listed, next_id, crossed

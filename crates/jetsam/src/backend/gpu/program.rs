@@ -164,6 +164,7 @@ pub fn text(model: &Model) -> String {
         ("LEAPFROG", s.integrator == Integrator::Leapfrog),
         ("SMOOTH", s.surface == Surface::Smooth),
         ("FULL_DAMPING", s.damping == Damping::Full),
+        ("RUBS", model.rubs()),
     ];
     let numbers = [
         ("NORMAL_ONLY", if s.damping == Damping::Normal { 1.0 } else { 0.0 }),

@@ -1,7 +1,7 @@
 //! Buffers of a world on the device, and the ways of a state there and back.
 
 use super::layout::{
-    self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, GONE, GpuBody, Rule, Sizes, Slot, Sums, Touch, three, vec, with,
+    self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, GONE, GpuBody, Rule, Sizes, Slot, Sums, Touch, three, with,
 };
 use super::program::{hoses, mortal};
 use crate::gpu::{Gpu, GpuError};
@@ -131,6 +131,7 @@ impl Buffers {
             make("order of agents", sizes.agents as usize, 4)?,
             make("blocks of cells of agents", ((sizes.agent_cells + 2).div_ceil(BLOCK)) as usize, 4)?,
             make("flocks", 1, size_of::<Crowd>() + model.flocks.len() * size_of::<Rule>())?,
+            make("slips of contacts", 2 * state.bodies.slips.len(), size_of::<layout::Slips>())?,
         ];
         let buffers = Self { all: buffers };
         buffers.fill(gpu, model, state, &walls, &parts, sizes);
@@ -162,6 +163,7 @@ impl Buffers {
         write(15, 0, bytemuck::cast_slice(parts));
         write(25, 0, bytemuck::cast_slice(&layout::agents(model, state)));
         write(31, 0, &layout::crowd(model, state, sizes));
+        write(32, 0, bytemuck::cast_slice(&b.slips.iter().map(layout::slips).collect::<Vec<_>>()));
         if !p.carry.is_empty() {
             write(17, 0, bytemuck::cast_slice(&p.carry[..n]));
         }
@@ -223,15 +225,14 @@ impl Buffers {
             let rules: &[Rule] = bytemuck::cast_slice(&crowd[size_of::<Crowd>() / 4..]);
             layout::to_agents(&agents, rules, state);
         }
+        let slips: Vec<layout::Slips> = self.fetch(gpu, &self.all[32], 0, state.bodies.slips.len())?;
         let b = &mut state.bodies;
+        b.slips.iter_mut().zip(&slips).for_each(|(to, from)| *to = layout::to_slips(from));
         for (body, from) in b.body.iter_mut().zip(&bodies) {
             layout::to_body(from, body);
         }
         for (s, slot) in slots.iter().enumerate().take(b.rigid_slots) {
             b.facing[s] = three(slot.facing);
-            if let Some(slip) = b.slip.get_mut(s) {
-                *slip = vec(slot.slip).to_array();
-            }
             if slot.place != GONE {
                 b.record[s] = records[slot.place as usize];
             }
