@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::scene::{Force, Wall};
 use crate::state::{Body, HELD_CONTACTS, State};
 use bytemuck::{Pod, Zeroable};
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DQuat, DVec3};
 
 /// Slots of one part of a body: a workgroup sums them.
 pub const PART: usize = 128;
