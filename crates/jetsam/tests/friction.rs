@@ -179,7 +179,8 @@ fn slips_outlive_other_constants_and_another_body() {
              [[rigid]]\nname = \"block\"\nshape = {{ {BLOCK} }}\ndensity = 1000\nposition = [0, 0, 0.04]\nfriction = 0.6\nrestitution = 0.1\n"
         )
     };
-    let other = "[[rigid]]\nname = \"other\"\nshape = { points = [[0, 0, 0]] }\nmass = 0.01\nposition = [0.8, 0, 0.3]\n";
+    let other =
+        "[[rigid]]\nname = \"other\"\nshape = { points = [[0, 0, 0]] }\nmass = 0.01\nposition = [0.8, 0, 0.3]\n";
     let mut w = world(&text(""));
     w.advance(0.4, |_, r| r.trouble.is_none());
     let x = w.state().bodies.body[0].x.x;

@@ -555,11 +555,15 @@ impl Cpu {
                 }
                 (true, false) => {
                     let all = chunks.zip(p.carry.par_chunks_mut(CHUNK));
-                    all.for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry, &mut [], &mut [], &mut Vec::new()));
+                    all.for_each(|((c, (push, chunk)), carry)| {
+                        work(c, push, chunk, carry, &mut [], &mut [], &mut Vec::new())
+                    });
                 }
                 (false, true) => {
                     let all = chunks.zip(p.vorticity.par_chunks_mut(CHUNK));
-                    all.for_each(|((c, (push, chunk)), vorticity)| work(c, push, chunk, &mut [], vorticity, &mut [], &mut Vec::new()));
+                    all.for_each(|((c, (push, chunk)), vorticity)| {
+                        work(c, push, chunk, &mut [], vorticity, &mut [], &mut Vec::new())
+                    });
                 }
                 (false, false) => chunks.for_each(|(c, (push, chunk))| {
                     work(c, push, chunk, &mut [], &mut [], &mut [], &mut Vec::new());
