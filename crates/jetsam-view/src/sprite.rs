@@ -101,7 +101,7 @@ fn drop(n: usize) -> Image {
         let [x, y] = [k % n, k / n].map(|i| (2.0 * (i as f32 + 0.5) / n as f32) - 1.0);
         let square = x * x + y * y;
         // as a ball lit from above on the left, and the sun in it
-        let light = 0.2 + 0.4 * (1.0 - square).max(0.0).sqrt() - 0.12 * y - 0.08 * x;
+        let light = 0.3 + 0.5 * (1.0 - square).max(0.0).sqrt() - 0.12 * y - 0.08 * x;
         let sun = (-((x + 0.35).powi(2) + (y + 0.4).powi(2)) / 0.04).exp();
         let tone = crate::color::byte(light.clamp(0.0, 1.0).max(sun));
         [tone, tone, tone, if square <= 1.0 { 255 } else { 0 }]

@@ -231,7 +231,7 @@ impl Renderer {
 
     /// From now on passes are timed, where the device has a clock. Whether it has.
     pub fn time_passes(&mut self) -> bool {
-        self.clock = Clock::new(&self.device, &self.queue);
+        self.clock = self.clock.take().or_else(|| Clock::new(&self.device, &self.queue));
         self.clock.is_some()
     }
 
