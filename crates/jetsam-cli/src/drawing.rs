@@ -43,9 +43,9 @@ mod with_gpu {
     use serde::Serialize;
     use std::time::Instant;
 
-    /// Pictures of a style, after a few to warm up.
-    const PICTURES: usize = 15;
-    const WARM: usize = 3;
+    /// Pictures of a style that warm up, and that count: on a GPU, and on a program in its place, which takes seconds for one.
+    const PICTURES: [usize; 2] = [3, 15];
+    const SLOW: [usize; 2] = [1, 3];
 
     const HEADER: &str =
         "scene            particles  picture    style           ms  wall ms\n                 milliseconds by pass";
@@ -100,7 +100,8 @@ mod with_gpu {
             } else {
                 frame.borrow(&world)
             }
-            let (times, wall_ms) = median(&mut studio, &frame, &style)?;
+            let counts = if gpu.info.is_hardware() { PICTURES } else { SLOW };
+            let (times, wall_ms) = median(&mut studio, &frame, &style, counts)?;
             let case = Case {
                 scene: name.into(),
                 backend: world.backend(),
@@ -118,9 +119,14 @@ mod with_gpu {
     }
 
     /// The picture that takes the median time, and the median time of the host.
-    fn median(studio: &mut Studio, frame: &Frame, style: &Style) -> miette::Result<(Times, f64)> {
+    fn median(
+        studio: &mut Studio,
+        frame: &Frame,
+        style: &Style,
+        [warm, counted]: [usize; 2],
+    ) -> miette::Result<(Times, f64)> {
         let (mut all, mut walls) = (Vec::new(), Vec::new());
-        for _ in 0..WARM + PICTURES {
+        for _ in 0..warm + counted {
             let start = Instant::now();
             let lines = Curves::default().lines(studio.show(), frame, style);
             let times = studio.times(frame, style, &lines)?.ok_or_else(|| {
@@ -132,11 +138,11 @@ mod with_gpu {
             walls.push(1e3 * start.elapsed().as_secs_f64());
             all.push(times);
         }
-        all.drain(..WARM);
-        walls.drain(..WARM);
+        all.drain(..warm);
+        walls.drain(..warm);
         all.sort_by(|a, b| a.ms.total_cmp(&b.ms));
         walls.sort_by(f64::total_cmp);
-        Ok((all.swap_remove(PICTURES / 2), walls[PICTURES / 2]))
+        Ok((all.swap_remove(counted / 2), walls[counted / 2]))
     }
 
     fn line(c: &Case) -> String {
