@@ -28,12 +28,21 @@ fn rub(felt: ptr<function, Felt>, a: Body, b: Body, k: f32, part: f32, counted: 
   let eta_t = part * dashpot(TANGENTIAL_DAMPING, k_t / part * number, mass) / number;
   // both particles remember the slip of a pair of moving bodies
   let share = select(1.0, 0.5, a.x.w > 0.0 && b.x.w > 0.0);
-  let slid = share * (slip - n * dot(slip, n)) + v * clock.dt;
+  let slid = share * (slip - n * dot(slip, n)) + v * clock.part;
   let limit = mu * load;
   let held = friction(k_t * slid, limit);
   (*felt).pull += held;
   (*felt).stiffness += k_t;
   return friction(held + eta_t * v, limit);
+}
+
+// Whether a joint holds two bodies together, so that they pass through each other.
+fn joined(a: u32, b: u32) -> bool {
+  for (var k = 0u; k < HAS_JOINTS; k += 1u) {
+    let who = joints[k].who;
+    if (who.w != 0u && ((who.y == a && who.z == b) || (who.y == b && who.z == a))) { return true; }
+  }
+  return false;
 }
 
 fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kind: u32) {
@@ -44,15 +53,16 @@ fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kin
   let own_slot = info[i].x;
   let a = bodies[owner];
   if (kind == STATIC && a.x.w == 0.0) { return; }
-  var near = walk(x, kind);
-  while (next(&near)) {
+  // particles of bodies may have gone on since they were sorted
+  var near = region(x, sqrt(reach_sq) + clock.stray, kind);
+  while (region_next(&near)) {
     let j = near.at;
     let body = info[j].y;
     let d = wrap(records[j].x.xyz - x);
     let r_sq = dot(d, d);
     if (r_sq >= reach_sq || body == owner) { continue; }
     let inverse_mass = a.x.w + bodies[body].x.w;
-    if (inverse_mass == 0.0) { continue; }
+    if (inverse_mass == 0.0 || joined(owner, body)) { continue; }
     let b = bodies[body];
     let r = sqrt(r_sq);
     let other_slot = info[j].x;
@@ -82,13 +92,13 @@ fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kin
     if (a.x.w == 0.0) { ln_e = b.law.x; } else if (b.x.w == 0.0) { ln_e = a.law.x; }
     let mass = 1.0 / inverse_mass;
     let k = contact_constants(mass, ln_e, max(a.law.y, b.law.y), counted, max(a.stated.x, b.stated.x), max(a.stated.y, b.stated.y));
-    var f = part * contact_force(along, v, s, diameter, k.x, k.y, NORMAL_ONLY, clock.dt);
+    var f = part * contact_force(along, v, s, diameter, k.x, k.y, NORMAL_ONLY, clock.part);
     let speed = dot(v, n);
     let overlap = diameter - s;
     let held = max(counted, 1.0) * k.x * (diameter * diameter - overlap * overlap);
     if (overlap > DEEP * diameter && speed < 0.0 && mass * speed * speed > HELD * held) {
       // taken within a step if as many contacts as a face has particles share it
-      let stop = select(0.0, mass / (clock.dt * max(a.law.z, b.law.z)), clock.dt > 0.0);
+      let stop = select(0.0, mass / (clock.part * max(a.law.z, b.law.z)), clock.part > 0.0);
       f += n * (speed * part * stop);
       (*felt).deep += 1.0;
     }

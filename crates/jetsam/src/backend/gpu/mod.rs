@@ -11,12 +11,12 @@ use super::{Backend, Batch, Request};
 use crate::gpu::{Gpu, GpuError};
 use crate::integrate::Advance;
 use crate::integrate::sources::{self, Birth};
-use crate::ledger::Ledger;
+use crate::ledger::{Ledger, Solve};
 use crate::model::{DtBound, Model};
 use crate::stage::Stage;
 use crate::state::{Body, Record, State};
 use layout::{Clock, GpuBody, Pose, Sizes, Sums, double};
-use program::{BOUNDS, Kernelet, Over, Program};
+use program::{BOUNDS, Kernelet, Over, Program, Times};
 use std::collections::VecDeque;
 use std::mem::size_of;
 use std::sync::OnceLock;
@@ -29,6 +29,8 @@ const LOGGED: usize = 512;
 const LISTED: usize = 1 << 16;
 /// Steps in one submission: a display must not wait for long.
 const SUBMITTED: usize = 8;
+/// Solves of implicit pressure in a step at most.
+const SOLVES: usize = 3;
 
 /// The GPU backend.
 pub struct OnGpu {
@@ -49,6 +51,8 @@ pub struct OnGpu {
     /// What the last step left behind, for the length of the next.
     last: Sums,
     flows: Flows,
+    /// Rounds that are queued for each solve of a step: a little more than steps before needed.
+    rounds: [usize; SOLVES],
 }
 
 /// Of the model's sources, what buffers and kernels were made for.
@@ -71,7 +75,7 @@ type Kernels = Vec<(Kernelet, [u32; 2])>;
 struct Ready {
     sizes: Sizes,
     buffers: Buffers,
-    stages: Vec<(Stage, Kernels)>,
+    stages: Vec<(Stage, Vec<(Times, Kernels)>)>,
     choose: Kernelet,
     timers: Option<Timers>,
 }
@@ -85,12 +89,6 @@ struct Timers {
 
 /// Why a scene cannot run on a GPU yet, in words.
 pub fn unsupported(model: &Model) -> Option<&'static str> {
-    if model.implicit() {
-        return Some("implicit pressure (solver.pressure = \"dfsph\" or \"pbf\")");
-    }
-    if !model.joints.is_empty() {
-        return Some("joints");
-    }
     if model.flocks.len() > 16 {
         return Some("more than sixteen flocks");
     }
@@ -124,6 +122,7 @@ impl OnGpu {
             fault: OnceLock::new(),
             last: Sums::default(),
             flows: Flows::default(),
+            rounds: [4; SOLVES],
         }
     }
 
@@ -139,7 +138,7 @@ impl OnGpu {
     }
 
     fn prepare(&mut self, model: &Model, state: &State) -> Result<(), GpuError> {
-        let gpu = &self.gpu;
+        let (gpu, solver) = (&self.gpu, model.solver.pressure);
         let ready = gpu.attempt(|| {
             let program = Program::new(gpu, model)?;
             let most = gpu.device.limits().max_storage_buffers_per_shader_stage;
@@ -152,15 +151,17 @@ impl OnGpu {
             let groups = |over| folded(gpu, groups(over, sizes));
             let stage = |stage: Stage| {
                 let wanted = |name| program::wanted(name, model, sizes.bodies > 0);
-                let kernels = program::kernels(stage).iter().filter(|(name, _)| wanted(name));
-                let made = kernels.map(|&(name, over)| (program.kernel(gpu, name, &buffers.all), groups(over)));
-                (stage, made.filter(|(_, g)| g[0] > 0).collect())
+                let made = |&&(name, over): &&(&'static str, Over)| wanted(name) && groups(over)[0] > 0;
+                let kernel = |&(name, over)| (program.kernel(gpu, name, &buffers.all), groups(over));
+                let sections = program::sections(stage, solver).iter();
+                let sections = sections.map(|(times, kernels)| (*times, kernels.iter().filter(made).map(kernel).collect()));
+                (stage, sections.collect())
             };
             Ok(Ready {
                 sizes,
-                stages: Stage::WCSPH.into_iter().map(stage).collect(),
+                stages: Stage::order(solver).iter().copied().map(stage).collect(),
                 choose: program.kernel(gpu, "choose", &buffers.all),
-                timers: Timers::new(gpu),
+                timers: Timers::new(gpu, Stage::order(solver).len() as u32),
                 buffers,
             })
         })?;
@@ -252,8 +253,8 @@ impl Backend for OnGpu {
     fn sources_changed(&mut self, model: &Model, time: f64) {
         if Flows::of(model) != self.flows {
             let state = self.download().clone();
-            self.upload(model, state);
-            self.known = time;
+            (self.coming, self.known, self.flows) = (VecDeque::new(), time, Flows::of(model));
+            self.rebuild(model, state);
             return;
         }
         // what was to come is listed anew
@@ -284,31 +285,31 @@ impl Backend for OnGpu {
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
         self.present = OnceLock::new();
-        if stage == Stage::Drift || (stage == Stage::Cells && !self.drifted) {
+        let advance = Advance { parts: advance.parts.max(1), ..advance };
+        let order = Stage::order(model.solver.pressure);
+        if Some(&stage) == order.first() || (stage == Stage::Cells && !self.drifted) {
             let gravity = layout::single(model.gravity_at(advance.end()), 0.0);
             let (dt, drag) = (advance.dt as f32, advance.drag as f32);
             let listed = self.list_births(model, advance.time, advance.end());
             let dt_before = advance.dt_before as f32;
-            self.write_clock(Clock { dt, dt_before, drag, gravity, running: 1, own: 0, ..listed });
-            self.scripts(model, advance);
+            let (parts, part) = (advance.parts, advance.part() as f32);
+            let clock = Clock { dt, dt_before, drag, gravity, running: 1, own: 0, part, parts, at: 0, ..listed };
+            self.write_clock(clock);
+        }
+        // what is sorted is what has drifted: without a drift, all stay where they are
+        if stage == Stage::Cells && !self.drifted && self.clock.dt == 0.0 {
+            self.run_stage(Stage::Drift, model, Advance { dt: 0.0, ..advance });
         }
         self.drifted = stage == Stage::Drift || (self.drifted && stage != Stage::Cells);
-        let undrifted = stage == Stage::Cells && !self.drifted && self.clock.dt == 0.0;
+        self.run_stage(stage, model, advance);
+        if stage != Stage::Ledger {
+            return;
+        }
         let found = self.attempt(|gpu, ready| {
-            let mut commands = gpu.device.create_command_encoder(&Default::default());
-            // what is sorted is what has drifted: without a drift, all stay where they are
-            let before = ready.stages.iter().filter(|(s, _)| undrifted && *s == Stage::Drift);
-            for (_, kernels) in before.chain(ready.stages.iter().filter(|(s, _)| *s == stage)) {
-                dispatch(&mut commands, kernels, None);
-            }
-            gpu.queue.submit([commands.finish()]);
-            if stage != Stage::Ledger {
-                return Ok(None);
-            }
             let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 0, 1)?;
-            Ok(Some((sums, ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1)?)))
+            Ok((sums, ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1)?))
         });
-        if let Some((sums, clock)) = found.flatten() {
+        if let Some((sums, clock)) = found {
             self.take(model, &sums);
             self.settle_births(clock[0]);
         }
@@ -320,10 +321,14 @@ impl Backend for OnGpu {
         }
         self.present = OnceLock::new();
         let last = &self.ledger;
-        let (guess, _) = model.largest_dt(last.speed, last.acceleration);
+        let (guess, _) = model.largest_dt(model.bounding_speed(last), last.acceleration);
+        let (one, body_speed) = (request.most == 1, last.body_speed);
         let wanted = (request.left / guess * 1.02).ceil() + 1.0;
         let steps = (wanted.min(LOGGED as f64 - 1.0) as usize).min(request.most);
         let ahead = (1.5 * guess * steps as f64).min(request.left);
+        // steps grow, and bodies get faster, until the host looks again
+        let (longest, faster) = if one { (guess.min(request.left), 1.0) } else { (1.25 * guess, 1.25) };
+        let most_parts = if model.implicit() { model.substeps(longest, faster * body_speed) } else { 1 };
         let listed = self.list_births(model, request.time, request.time + ahead);
         self.write_clock(Clock {
             left: request.left.min(f64::from(f32::MAX)) as f32,
@@ -331,33 +336,19 @@ impl Backend for OnGpu {
             drag: request.drag as f32,
             running: 1,
             own: 1,
+            most_parts,
+            rounds: [0; 4],
             ..listed
         });
-        let (sums, ticks, clock) = self.attempt(|gpu, ready| {
-            let mut made = 0;
-            while made < steps {
-                let mut commands = gpu.device.create_command_encoder(&Default::default());
-                for step in made..(made + SUBMITTED).min(steps) {
-                    let timers = ready.timers.as_ref().filter(|_| step == 0);
-                    dispatch_one(&mut commands, &ready.choose, [1, 1]);
-                    for (k, (_, kernels)) in ready.stages.iter().enumerate() {
-                        dispatch(&mut commands, kernels, timers.map(|t| (t, k as u32)));
-                    }
-                    if let Some(timers) = timers {
-                        timers.resolve(&mut commands);
-                    }
-                }
-                gpu.queue.submit([commands.finish()]);
-                made += SUBMITTED;
-            }
-            let clock: Vec<Clock> = ready.buffers.fetch(gpu, ready.buffers.clock(), 0, 1)?;
-            let done = clock[0].step as usize;
+        let clock = self.queue_steps(model, steps, most_parts as usize)?;
+        let (sums, ticks) = self.attempt(|gpu, ready| {
+            let done = clock.step as usize;
             let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 1, done.max(1))?;
             let ticks = match &ready.timers {
                 Some(timers) => timers.read(gpu, &ready.buffers)?,
                 None => Vec::new(),
             };
-            Ok((sums[..done].to_vec(), ticks, clock[0]))
+            Ok((sums[..done].to_vec(), ticks))
         })?;
         self.settle_births(clock);
         let mut batch = Batch::default();
@@ -366,9 +357,7 @@ impl Backend for OnGpu {
             let bound = BOUNDS.get(s.step[1].to_bits() as usize).copied().unwrap_or(DtBound::Frame);
             batch.steps.push((f64::from(s.step[0]), bound, self.ledger.clone()));
         }
-        for (time, tick) in batch.stages.iter_mut().zip(ticks) {
-            *time = tick * sums.len() as u32;
-        }
+        batch.stages = ticks.into_iter().map(|tick| tick * sums.len() as u32).collect();
         Some(batch)
     }
 
@@ -390,6 +379,151 @@ impl Backend for OnGpu {
 
     fn fault(&self) -> Option<&GpuError> {
         self.fault.get()
+    }
+}
+
+impl OnGpu {
+    /// Queues so many steps, and waits for them. Where the rounds of a solve did not suffice the device has stopped in the midst of a
+    /// step, and is told to go on with more.
+    fn queue_steps(&mut self, model: &Model, steps: usize, parts: usize) -> Option<Clock> {
+        let at_once = if model.implicit() { 1 } else { SUBMITTED };
+        let (mut done, mut from, mut measured) = (0, None, false);
+        loop {
+            let rounds = self.rounds;
+            let clock = self.attempt(|gpu, ready| {
+                let mut made = done;
+                while made < steps {
+                    let mut commands = gpu.device.create_command_encoder(&Default::default());
+                    for step in made..(made + at_once).min(steps) {
+                        let begin = from.filter(|_| step == done);
+                        let timers = ready.timers.as_ref().filter(|_| step == 0 && !measured);
+                        ready.step(&mut commands, begin, rounds, parts, timers);
+                    }
+                    gpu.queue.submit([commands.finish()]);
+                    made += at_once;
+                }
+                Ok(ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1)?[0])
+            })?;
+            measured = true;
+            done = clock.step as usize;
+            from = self.resume(model, clock);
+            if from.is_none() {
+                return Some(clock);
+            }
+        }
+    }
+
+    /// Rounds to queue from now on. Where a solve stands still for want of rounds it is told to go on: returns its number.
+    fn resume(&mut self, model: &Model, clock: Clock) -> Option<usize> {
+        let budget = model.solver.iterations.ceil() as usize;
+        let stands = (clock.halted as usize).checked_sub(1);
+        for (number, rounds) in self.rounds.iter_mut().enumerate() {
+            let needed = clock.rounds[number] as usize;
+            *rounds = if stands == Some(number) { *rounds * 2 } else { needed + needed / 4 + 2 }.min(budget);
+        }
+        if stands.is_some() {
+            let running = bytemuck::offset_of!(Clock, running) as u64;
+            let halted = bytemuck::offset_of!(Clock, halted) as u64;
+            self.attempt(|gpu, ready| {
+                gpu.queue.write_buffer(ready.buffers.clock(), running, bytemuck::bytes_of(&1u32));
+                gpu.queue.write_buffer(ready.buffers.clock(), halted, bytemuck::bytes_of(&0u32));
+                Ok(())
+            });
+        }
+        stands
+    }
+
+    /// One stage of a step whose length the host has chosen, with all the rounds that its solves need.
+    fn run_stage(&mut self, stage: Stage, model: &Model, advance: Advance) {
+        let Some(k) = Stage::order(model.solver.pressure).iter().position(|s| *s == stage) else { return };
+        let solves = matches!(stage, Stage::Divergence | Stage::Pressure) && model.implicit();
+        if stage == Stage::Drift {
+            return self.run_drift(k, model, advance);
+        }
+        let mut from = None;
+        loop {
+            let rounds = self.rounds;
+            let clock = self.attempt(|gpu, ready| {
+                ready.submit(gpu, |pass| ready.stage(pass, k, &mut from, rounds, 1));
+                let clock = || ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1);
+                if solves { clock().map(|c| c.first().copied()) } else { Ok(None) }
+            });
+            from = clock.flatten().and_then(|clock| self.resume(model, clock));
+            if from.is_none() {
+                return;
+            }
+        }
+    }
+
+    /// The drift, part by part: scripts and shaking are known to the host alone.
+    fn run_drift(&mut self, k: usize, model: &Model, advance: Advance) {
+        let sections = self.ready.as_ref().map_or(0, |r| r.stages[k].1.len());
+        for section in 0..sections {
+            let times = self.ready.as_ref().map(|r| r.stages[k].1[section].0);
+            let parts = if times == Some(Times::Parts) { 0..advance.parts - 1 } else { advance.parts - 1..advance.parts };
+            for part in parts {
+                if times == Some(Times::Parts) || section + 1 == sections {
+                    self.scripts(model, advance.nth_part(part));
+                }
+                self.attempt(|gpu, ready| {
+                    ready.submit(gpu, |pass| run_all(pass, &ready.stages[k].1[section].1));
+                    Ok(())
+                });
+            }
+        }
+    }
+}
+
+impl Ready {
+    fn submit(&self, gpu: &Gpu, record: impl FnOnce(&mut wgpu::ComputePass)) {
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        record(&mut commands.begin_compute_pass(&Default::default()));
+        gpu.queue.submit([commands.finish()]);
+    }
+
+    /// Records a step, or what is left of it `from` a solve on.
+    fn step(
+        &self,
+        commands: &mut wgpu::CommandEncoder,
+        mut from: Option<usize>,
+        rounds: [usize; SOLVES],
+        parts: usize,
+        timers: Option<&Timers>,
+    ) {
+        if from.is_none() {
+            run_one(&mut commands.begin_compute_pass(&Default::default()), &self.choose, [1, 1]);
+        }
+        for k in 0..self.stages.len() {
+            let timestamp_writes = timers.map(|timers| timers.of(k as u32));
+            let pass = wgpu::ComputePassDescriptor { label: None, timestamp_writes };
+            self.stage(&mut commands.begin_compute_pass(&pass), k, &mut from, rounds, parts);
+        }
+        if let Some(timers) = timers {
+            timers.resolve(commands);
+        }
+    }
+
+    /// Records a stage; what stands before the solve `from` is left out.
+    fn stage(
+        &self,
+        pass: &mut wgpu::ComputePass,
+        k: usize,
+        from: &mut Option<usize>,
+        rounds: [usize; SOLVES],
+        parts: usize,
+    ) {
+        for (times, kernels) in &self.stages[k].1 {
+            if from.is_some_and(|number| *times == Times::Rounds(number)) {
+                *from = None;
+            }
+            let times = match times {
+                _ if from.is_some() => 0,
+                Times::Once => 1,
+                Times::Rounds(number) => rounds[*number],
+                Times::Parts => parts - 1,
+            };
+            (0..times).for_each(|_| run_all(pass, kernels));
+        }
     }
 }
 
@@ -430,20 +564,42 @@ impl OnGpu {
     fn grow(&mut self, model: &Model, more: usize) {
         let mut state = self.download().clone();
         state.particles.grow(more);
+        self.rebuild(model, state);
+    }
+
+    /// Other buffers for a state; what the last step left behind goes on.
+    fn rebuild(&mut self, model: &Model, state: State) {
+        let swept = self.attempt(|gpu, ready| {
+            let swept = ready.buffers.swept();
+            ready.buffers.fetch::<u8>(gpu, swept, 0, swept.size() as usize)
+        });
         if let Err(fault) = self.prepare(model, &state) {
             self.fail(fault);
         }
-        let last = self.last;
+        let (last, clock) = (self.last, self.clock);
         self.attempt(|gpu, ready| {
             gpu.queue.write_buffer(ready.buffers.log(), 0, bytemuck::bytes_of(&last));
+            gpu.queue.write_buffer(ready.buffers.clock(), 0, bytemuck::bytes_of(&clock));
+            gpu.queue.write_buffer(ready.buffers.swept(), 0, &swept.unwrap_or_default());
             Ok(())
         });
         self.start = state;
     }
 
-    /// Bodies that follow scripts take the poses of the end of a step (E15).
+    /// Bodies that follow scripts take the poses of the end of a step (E15), or of a part of it; so does shaking.
     fn scripts(&mut self, model: &Model, advance: Advance) {
-        if advance.drag > 0.0 || advance.dt == 0.0 || model.paths.iter().all(Option::is_none) {
+        if advance.drag > 0.0 || advance.dt == 0.0 {
+            return;
+        }
+        if !model.shakes.is_empty() {
+            let gravity = layout::single(model.gravity_at(advance.end()), 0.0);
+            let at = bytemuck::offset_of!(Clock, gravity) as u64;
+            self.attempt(|gpu, ready| {
+                gpu.queue.write_buffer(ready.buffers.clock(), at, bytemuck::bytes_of(&gravity));
+                Ok(())
+            });
+        }
+        if model.paths.iter().all(Option::is_none) {
             return;
         }
         let mut moved: Vec<(usize, Pose)> = Vec::new();
@@ -479,7 +635,9 @@ fn groups(over: Over, s: Sizes) -> u32 {
         Over::Cells(size) => s.bins().div_ceil(size),
         Over::Blocks => s.blocks(),
         Over::Bodies(size) => s.bodies.div_ceil(size),
+        Over::Movers(size) => s.movers.div_ceil(size),
         Over::Parts => s.parts,
+        Over::RigidParts => s.rigid_parts,
         Over::Groups => s.groups,
         Over::Agents(size) => s.agents.div_ceil(size),
         Over::AgentCells(size) => (s.agent_cells + 2).div_ceil(size),
@@ -496,25 +654,11 @@ fn folded(gpu: &Gpu, groups: u32) -> [u32; 2] {
     [x, groups.div_ceil(x.max(1))]
 }
 
-fn dispatch(commands: &mut wgpu::CommandEncoder, kernels: &[(Kernelet, [u32; 2])], timers: Option<(&Timers, u32)>) {
-    let timestamp_writes = timers.map(|(timers, k)| wgpu::ComputePassTimestampWrites {
-        query_set: &timers.ticks,
-        beginning_of_pass_write_index: Some(2 * k),
-        end_of_pass_write_index: Some(2 * k + 1),
-    });
-    if kernels.is_empty() && timestamp_writes.is_none() {
-        return;
-    }
-    let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
-    for (kernel, [x, y]) in kernels {
-        pass.set_pipeline(&kernel.pipeline);
-        pass.set_bind_group(0, &kernel.bound, &[]);
-        pass.dispatch_workgroups(*x, *y, 1);
-    }
+fn run_all(pass: &mut wgpu::ComputePass, kernels: &[(Kernelet, [u32; 2])]) {
+    kernels.iter().for_each(|(kernel, groups)| run_one(pass, kernel, *groups));
 }
 
-fn dispatch_one(commands: &mut wgpu::CommandEncoder, kernel: &Kernelet, [x, y]: [u32; 2]) {
-    let mut pass = commands.begin_compute_pass(&Default::default());
+fn run_one(pass: &mut wgpu::ComputePass, kernel: &Kernelet, [x, y]: [u32; 2]) {
     pass.set_pipeline(&kernel.pipeline);
     pass.set_bind_group(0, &kernel.bound, &[]);
     pass.dispatch_workgroups(x, y, 1);
@@ -549,13 +693,17 @@ fn to_ledger(s: &Sums, before: &Ledger) -> Ledger {
         rigid_lost: rigid_lost as usize,
         fast_contacts: before.fast_contacts + u64::from(fast),
         nonfinite: before.nonfinite + u64::from(nonfinite),
+        put_back: before.put_back + s.impulse[3] as u64,
+        pressed: (3.0 * number(s.fluids[3]) / f64::from(fluid.max(1))).powf(0.25),
+        pressure: Solve { iterations: s.said[0] as u32, residual: number(s.said[1]) },
+        divergence: Solve { iterations: s.said[2] as u32, residual: number(s.said[3]) },
         ..Ledger::default()
     }
 }
 
 impl Timers {
-    fn new(gpu: &Gpu) -> Option<Self> {
-        let count = 2 * Stage::WCSPH.len() as u32;
+    fn new(gpu: &Gpu, stages: u32) -> Option<Self> {
+        let count = 2 * stages;
         let bytes = 8 * u64::from(count);
         let buffer = |label, usage| {
             let descriptor =
@@ -573,8 +721,17 @@ impl Timers {
         })
     }
 
+    /// Round the stage number `k`.
+    fn of(&self, k: u32) -> wgpu::ComputePassTimestampWrites<'_> {
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.ticks,
+            beginning_of_pass_write_index: Some(2 * k),
+            end_of_pass_write_index: Some(2 * k + 1),
+        }
+    }
+
     fn resolve(&self, commands: &mut wgpu::CommandEncoder) {
-        commands.resolve_query_set(&self.ticks, 0..2 * Stage::WCSPH.len() as u32, &self.resolved, 0);
+        commands.resolve_query_set(&self.ticks, 0..(self.resolved.size() / 8) as u32, &self.resolved, 0);
         commands.copy_buffer_to_buffer(&self.resolved, 0, &self.home, 0, self.resolved.size());
     }
 

@@ -13,7 +13,7 @@ use crate::interact::pressure::BELOW_SUM;
 use crate::laws::kernel::Kernel;
 use crate::model::{CONTACT_REACH, DtBound, Model, TANGENTIAL, TANGENTIAL_DAMPING, TRAVEL};
 use crate::scene::{
-    Coupling, Damping, Density, EquationOfState, Force, Integrator, PressureForce, Surface, Viscosity, Wall,
+    Coupling, Damping, Density, EquationOfState, Force, Integrator, Pressure, PressureForce, Surface, Viscosity, Wall,
 };
 use crate::stage::Stage;
 use glam::DVec3;
@@ -21,7 +21,9 @@ use std::fmt::Write as _;
 use wgpu::naga;
 
 /// What bounds a step, by the number kernels know it by.
-pub const BOUNDS: [DtBound; 8] = [
+pub const BOUNDS: [DtBound; 10] = [
+    DtBound::Flow,
+    DtBound::Longest,
     DtBound::Sound,
     DtBound::Force,
     DtBound::Viscosity,
@@ -33,11 +35,12 @@ pub const BOUNDS: [DtBound; 8] = [
 ];
 
 /// The texts, in the order of the step.
-const TEXTS: [&str; 16] = [
+const TEXTS: [&str; 19] = [
     include_str!("../../laws/kernel.wgsl"),
     include_str!("../../laws/fluid.wgsl"),
     include_str!("../../laws/contact.wgsl"),
     include_str!("../../laws/field.wgsl"),
+    include_str!("../../laws/implicit.wgsl"),
     include_str!("../../laws/flock.wgsl"),
     include_str!("common.wgsl"),
     include_str!("../../integrate/particles.wgsl"),
@@ -52,6 +55,8 @@ const TEXTS: [&str; 16] = [
         include_str!("../../interact/forces.wgsl"),
         include_str!("ledger.wgsl")
     ),
+    concat!(include_str!("../../interact/links.wgsl"), include_str!("../../interact/implicit.wgsl")),
+    concat!(include_str!("parts.wgsl"), include_str!("../../integrate/joints.wgsl")),
     include_str!("../../flock/agents.wgsl"),
     include_str!("../../flock/decide.wgsl"),
 ];
@@ -73,8 +78,12 @@ pub enum Over {
     Blocks,
     /// Bodies.
     Bodies(u32),
+    /// Those that have rigid slots.
+    Movers(u32),
     /// Parts of bodies, one workgroup each.
     Parts,
+    /// Those of rigid slots.
+    RigidParts,
     /// Groups of the ledger.
     Groups,
     /// Agents.
@@ -89,45 +98,190 @@ pub enum Over {
     One,
 }
 
-/// The kernels of a stage, in their order. `choose` stands before the first stage.
-pub fn kernels(stage: Stage) -> &'static [(&'static str, Over)] {
+/// How often the kernels of a section run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Times {
+    /// Once.
+    Once,
+    /// As many rounds as the solve of that number in a step needs.
+    Rounds(usize),
+    /// For each part of a step of bodies but the last.
+    Parts,
+}
+
+/// Kernels in their order, and how often they run.
+pub type Section = (Times, &'static [(&'static str, Over)]);
+
+/// What bodies do before they are drifted, and what makes their slots follow.
+const DRIFT_BODIES: [(&str, Over); 3] =
+    [("half_kick_bodies", Over::Bodies(64)), ("joints_drift", Over::One), ("drift_bodies", Over::Bodies(64))];
+/// A round of shares that push fluids and bodies.
+const ROUND: &[(&str, Over)] = &[
+    ("accelerate", Over::Fluids(128)),
+    ("press_rigid", Over::Slots(128)),
+    ("thrust_parts", Over::RigidParts),
+    ("thrust_bodies", Over::Movers(64)),
+    ("push_bodies", Over::Slots(128)),
+    ("relax", Over::Fluids(128)),
+    ("judge", Over::One),
+];
+/// What follows its rounds, walls too.
+const PUSHED: [(&str, Over); 7] = [
+    ("close", Over::One),
+    ("finish", Over::Fluids(128)),
+    ("accelerate", Over::Fluids(128)),
+    ("press_all", Over::BodyParticles(128)),
+    ("thrust_parts", Over::Parts),
+    ("thrust_bodies", Over::Bodies(64)),
+    ("push_bodies", Over::Slots(128)),
+];
+/// Links of a turn of PBF, and whether it is needed.
+const TURN: &[(&str, Over)] =
+    &[("links", Over::Fluids(128)), ("begin_turn", Over::One), ("seat", Over::Moving(128))];
+const TURNED: &[(&str, Over)] = &[
+    PUSHED[0],
+    PUSHED[1],
+    PUSHED[2],
+    PUSHED[3],
+    PUSHED[4],
+    PUSHED[5],
+    ("shift_fluid", Over::Fluids(128)),
+    ("shift_bodies", Over::Bodies(64)),
+    ("shift_slots", Over::Slots(128)),
+];
+
+/// The sections of a stage, in their order. `choose` stands before the first stage.
+pub fn sections(stage: Stage, solver: Pressure) -> &'static [Section] {
     use Over::*;
-    match stage {
-        Stage::Drift => &[("drift_fluid", Fluids(128)), ("drift_bodies", Bodies(64)), ("follow", Slots(128))],
-        Stage::Cells => &[
-            ("clear", Cells(256)),
-            ("histogram", Moving(256)),
-            ("scan_blocks", Blocks),
-            ("scan_tops", One),
-            ("scan_add", Cells(256)),
-            ("scatter", Moving(256)),
-            ("gather", Moving(256)),
+    use Times::{Once, Parts, Rounds};
+    match (stage, solver) {
+        (Stage::Drift, Pressure::Dfsph | Pressure::Pbf) => &[
+            (Once, &[("glide", Fluids(128)), ("steady_bodies", Bodies(64))]),
+            (
+                Parts,
+                &[
+                    ("part", One),
+                    ("half_kick_bodies", Movers(64)),
+                    ("joints_drift", One),
+                    ("drift_bodies", Movers(64)),
+                    ("follow_part", Slots(128)),
+                    ("straying", One),
+                    ("touch_bodies", Slots(128)),
+                    ("sum_parts", RigidParts),
+                    ("sum_bodies", Movers(64)),
+                    ("joints_pull", One),
+                    ("end_part", Movers(64)),
+                    ("joints_kick", One),
+                ],
+            ),
+            (Once, &[("last_part", One), DRIFT_BODIES[0], DRIFT_BODIES[1], DRIFT_BODIES[2], ("follow", Slots(128))]),
         ],
-        Stage::Density => &[("density", Fluids(128))],
-        Stage::Divergence => &[],
-        Stage::Pressure => &[("pressure", Fluids(128))],
-        Stage::Boundary => &[("boundary", BodyParticles(128))],
-        Stage::Gradients => &[("gradients", Fluids(128))],
-        Stage::Forces => &[("forces_fluid", Fluids(128)), ("forces_body", BodyParticles(128)), ("hold", Fluids(128))],
-        Stage::Bodies => &[("sum_parts", Parts), ("sum_bodies", Bodies(64))],
-        Stage::Kick => &[("kick_fluid", Fluids(128)), ("kick_bodies", Bodies(64))],
-        Stage::Ledger => &[("tally", Groups), ("tally_agents", Agents(128)), ("total", One)],
-        Stage::Agents => &[
-            ("travel", Agents(64)),
-            ("crowd_clock", One),
-            ("agent_bounds", Agents(256)),
-            ("agent_grid", One),
-            ("agent_clear", AgentCells(256)),
-            ("agent_histogram", Agents(256)),
-            ("agent_scan_blocks", AgentCells(BLOCK)),
-            ("agent_scan_tops", One),
-            ("agent_scan_add", AgentCells(256)),
-            ("agent_scatter", Agents(256)),
-            ("agent_gather", Agents(256)),
-            ("decide", Agents(64)),
-            ("give", Particles(128)),
+        (Stage::Drift, _) => &[(
+            Once,
+            &[
+                ("drift_fluid", Fluids(128)),
+                DRIFT_BODIES[0],
+                DRIFT_BODIES[1],
+                DRIFT_BODIES[2],
+                ("follow", Slots(128)),
+            ],
+        )],
+        (Stage::Cells, _) => &[(
+            Once,
+            &[
+                ("clear", Cells(256)),
+                ("histogram", Moving(256)),
+                ("scan_blocks", Blocks),
+                ("scan_tops", One),
+                ("scan_add", Cells(256)),
+                ("scatter", Moving(256)),
+                ("gather", Moving(256)),
+            ],
+        )],
+        (Stage::Density, _) => &[(Once, &[("density", Fluids(128))])],
+        (Stage::Divergence, _) => &[
+            (
+                Once,
+                &[
+                    ("begin_velocities", One),
+                    ("links", Fluids(128)),
+                    ("seat", Moving(128)),
+                    ("flow_of_bodies", Slots(128)),
+                    ("errors_of_velocities", Fluids(128)),
+                    ("velocities", One),
+                ],
+            ),
+            (Rounds(0), ROUND),
+            (Once, &PUSHED),
+            (Once, &[("load_bodies", Bodies(64)), ("take_velocities", Fluids(128))]),
         ],
-        Stage::Sources => &[("room", Births(64)), ("bear", One), ("drain", Fluids(128))],
+        (Stage::Pressure, Pressure::Dfsph) => &[
+            (Once, &[("begin_places", One), ("errors_of_places", Moving(128))]),
+            (Rounds(1), &[("accelerate", Fluids(128)), ("relax", Fluids(128)), ("judge", One)]),
+            (Once, &[("close", One), ("finish", Fluids(128)), ("accelerate", Fluids(128))]),
+        ],
+        (Stage::Pressure, Pressure::Pbf) => &[
+            (Once, &[("begin_turns", One)]),
+            (Once, TURN),
+            (Rounds(0), ROUND),
+            (Once, TURNED),
+            (Once, TURN),
+            (Rounds(1), ROUND),
+            (Once, TURNED),
+            (Once, TURN),
+            (Rounds(2), ROUND),
+            (Once, TURNED),
+            (Once, &[("links", Fluids(128)), ("begin_turn", One), ("straying", One), ("keep_inside", Fluids(128))]),
+        ],
+        (Stage::Pressure, _) => &[(Once, &[("pressure", Fluids(128))])],
+        (Stage::Boundary, _) => &[(Once, &[("boundary", BodyParticles(128))])],
+        (Stage::Gradients, _) => &[(Once, &[("gradients", Fluids(128))])],
+        (Stage::Forces, _) => &[(
+            Once,
+            &[("forces_fluid", Fluids(128)), ("forces_body", BodyParticles(128)), ("hold_hoses", Fluids(128))],
+        )],
+        (Stage::Bodies, Pressure::Dfsph | Pressure::Pbf) => &[(
+            Once,
+            &[
+                ("sum_parts", Over::Parts),
+                ("sum_bodies", Bodies(64)),
+                ("joints_pull", One),
+                ("end_part", Bodies(64)),
+                ("joints_kick", One),
+            ],
+        )],
+        (Stage::Bodies, _) => {
+            &[(Once, &[("sum_parts", Over::Parts), ("sum_bodies", Bodies(64)), ("joints_pull", One)])]
+        }
+        (Stage::Kick, Pressure::Dfsph | Pressure::Pbf) => {
+            &[(Once, &[("push_fluid", Fluids(128)), ("unload_bodies", Bodies(64))])]
+        }
+        (Stage::Kick, _) => {
+            &[(Once, &[("kick_fluid", Fluids(128)), ("kick_bodies", Bodies(64)), ("joints_kick", One)])]
+        }
+        (Stage::Ledger, _) => &[(
+            Once,
+            &[("tally", Groups), ("tally_bodies", Groups), ("tally_agents", Agents(128)), ("total", One)],
+        )],
+        (Stage::Agents, _) => &[(
+            Once,
+            &[
+                ("travel", Agents(64)),
+                ("crowd_clock", One),
+                ("agent_bounds", Agents(256)),
+                ("agent_grid", One),
+                ("agent_clear", AgentCells(256)),
+                ("agent_histogram", Agents(256)),
+                ("agent_scan_blocks", AgentCells(BLOCK)),
+                ("agent_scan_tops", One),
+                ("agent_scan_add", AgentCells(256)),
+                ("agent_scatter", Agents(256)),
+                ("agent_gather", Agents(256)),
+                ("decide", Agents(64)),
+                ("give", Particles(128)),
+            ],
+        )],
+        (Stage::Sources, _) => &[(Once, &[("room", Births(64)), ("bear", One), ("drain", Fluids(128))])],
     }
 }
 
@@ -140,7 +294,8 @@ pub fn text(model: &Model) -> String {
     let tension = model.fluids.iter().any(|f| f.cohesion > 0.0 || f.curvature > 0.0);
     let continuity = s.density == Density::Continuity;
     let bound_code = |bound| BOUNDS.iter().position(|&b| b == bound).unwrap_or(0);
-    let constant = model.dt_bounds.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(DtBound::Frame, |b| b.0);
+    let steady = model.dt_bounds.iter().filter(|b| !(model.implicit() && b.0 == DtBound::Contact));
+    let constant = steady.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(DtBound::Frame, |b| b.0);
     let mut text = String::new();
     let switches = [
         ("FLAT", flat),
@@ -163,6 +318,8 @@ pub fn text(model: &Model) -> String {
         ("WALLS_SLIP", s.walls_slip),
         ("LEAPFROG", s.integrator == Integrator::Leapfrog),
         ("SMOOTH", s.surface == Surface::Smooth),
+        ("IMPLICIT", model.implicit()),
+        ("PBF", s.pressure == Pressure::Pbf),
         ("FULL_DAMPING", s.damping == Damping::Full),
     ];
     let numbers = [
@@ -184,8 +341,12 @@ pub fn text(model: &Model) -> String {
         ("HAS_HOSES", hoses(model).count()),
         ("DRAINS", model.drains.len().max(1)),
         ("HAS_DRAINS", model.drains.len()),
+        ("HAS_JOINTS", model.joints.len()),
         ("BY_SOUND", bound_code(DtBound::Sound)),
         ("BY_FORCE", bound_code(DtBound::Force)),
+        ("BY_CONTACT", bound_code(DtBound::Contact)),
+        ("BY_FLOW", bound_code(DtBound::Flow)),
+        ("BY_LONGEST", bound_code(DtBound::Longest)),
         ("BY_TRAVEL", bound_code(DtBound::Travel)),
         ("BY_SCENE", bound_code(DtBound::Scene)),
         ("BY_FRAME", bound_code(DtBound::Frame)),
@@ -259,10 +420,15 @@ pub fn wanted(name: &str, model: &Model, bodies: bool) -> bool {
         "gradients" => model.wants_gradients(),
         "room" | "bear" => !model.sources.is_empty(),
         "drain" => !model.drains.is_empty() || mortal(model),
-        "hold" => hoses(model).next().is_some(),
+        "boundary" => bodies && (!model.implicit() || model.no_slip),
+        "hold_hoses" => hoses(model).next().is_some(),
         "give" => model.flocks.iter().any(|f| f.matter.is_some()),
+        // part of `drift_bodies` where there is nothing between
+        "half_kick_bodies" => !model.joints.is_empty(),
+        name if name.starts_with("joint") => !model.joints.is_empty(),
         "travel" | "crowd_clock" | "decide" => !model.flocks.is_empty(),
         name if name.contains("agent") => !model.flocks.is_empty(),
+        "straying" => bodies,
         _ => bodies || !(name.contains("bod") || name.contains("part")),
     }
 }
@@ -391,6 +557,8 @@ mod tests {
             "[world]\ndimensions = 2",
             "[solver]\ndensity = \"continuity\"\nshifting = 1.0",
             "[solver]\nviscosity = \"mueller\"\nkernel = \"mueller\"\npressure_force = \"mueller\"",
+            "[solver]\npressure = \"dfsph\"\nxsph = 0.1",
+            "[solver]\npressure = \"pbf\"\ncoupling = \"spring\"",
             "[solver]\nvorticity = 0.1\nxsph = 0.1\ncoupling = \"spring\"\ndamping = \"full\"",
         ];
         for choice in choices {
