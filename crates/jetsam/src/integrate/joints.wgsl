@@ -133,7 +133,7 @@ fn give_one(e: End, push: vec3<f32>, turn: vec3<f32>, half: bool) {
     bodies[e.body].omega = vec4<f32>(spin(b, b.q, now.sum), 0.0);
   }
 }
-fn give(a: End, b: End, i: Impulses, half: bool) {
+fn give_both(a: End, b: End, i: Impulses, half: bool) {
   if (a.moves) { give_one(a, i.push, i.turn, half); }
   if (b.moves) { give_one(b, -i.push, -i.turn, half); }
   else { clock.joint_impulse += vec4<f32>(i.push, 0.0); }
@@ -148,7 +148,7 @@ fn fit_place(j: Joint) -> f32 {
   if (j.who.z != GONE) { tip_b = turn(b.q, j.anchor_b.xyz); }
   let gap = ((b.x - a.x) - (b.rest - a.rest)) + dt * (b.v - a.v) + (tip_b - turn(a.q, j.anchor_a.xyz));
   let misfit = turn_misfit(j, a.q, b.q);
-  give(a, b, impulses(j, a, b, bodies[j.who.y].q, gap / dt, misfit / dt), true);
+  give_both(a, b, impulses(j, a, b, bodies[j.who.y].q, gap / dt, misfit / dt), true);
   return max(length(gap) / m.lower.w, length(misfit));
 }
 // Corrects velocities so that a joint's ends move alike; returns by how much they did not.
@@ -166,7 +166,7 @@ fn fit_velocity(j: Joint) -> f32 {
     let beyond = past_limit(j, a.q, b.q);
     if (beyond != 0.0 && -dot(spun, axis) * beyond > 0.0) { misfit = spun; }
   }
-  give(a, b, impulses(j, a, b, a.q, gap, misfit), false);
+  give_both(a, b, impulses(j, a, b, a.q, gap, misfit), false);
   return max(length(gap), length(misfit) * m.lower.w) / j.law.w;
 }
 

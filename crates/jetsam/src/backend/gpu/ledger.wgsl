@@ -28,8 +28,10 @@ fn of_fluid(i: u32) -> Sums {
     s.outer += held[i].force;
     if (IMPLICIT) { s.impulse = held[i].impulse; }
   }
-  let head = r.v.w / fluid.density;
-  s.fluids = vec4<f32>(s.outer.xyz, head * head);
+  if (IMPLICIT) {
+    let head = r.v.w / fluid.density;
+    s.fluids = vec4<f32>(s.outer.xyz, head * head);
+  }
   s.energy = vec4<f32>(0.5 * fluid.mass * speed * speed, -fluid.mass * dot(m.gravity.xyz, r.x.xyz - m.corner.xyz), fluid.mass * s.step.w, 0.0);
   let near = bitcast<u32>(before[i].w);
   s.crossed.w = f32(near & 0xffffu) - 1.0;
@@ -166,7 +168,7 @@ fn total(@builtin(local_invocation_index) l: u32) {
 // The length of the next step, where kernels choose it: the twin of `World::next_dt` and `Model::largest_dt`.
 @compute @workgroup_size(1)
 fn choose() {
-  if (clock.own == 0u) { return; }
+  if (clock.own == 0u || clock.running == 0u) { return; }
   var left = clock.left - clock.gravity.w;
   if (clock.left <= 0.0) { clock.running = 0u; return; }
   var end = BY_FRAME;

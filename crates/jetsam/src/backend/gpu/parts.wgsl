@@ -94,6 +94,7 @@ fn keep_inside(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
 // A part begins: the parts before the last are as many as were queued, or fewer.
 @compute @workgroup_size(1)
 fn part() {
+  if (clock.running == 0u) { return; }
   clock.at += 1u;
   clock.mid = 1u;
   clock.idle = select(0u, 1u, clock.at >= clock.parts || clock.drag > 0.0);
@@ -101,9 +102,9 @@ fn part() {
 // The last part begins: after it particles are sorted anew.
 @compute @workgroup_size(1)
 fn last_part() {
+  if (clock.running == 0u) { return; }
   clock.mid = 0u;
   clock.idle = 0u;
-  if (clock.running == 0u) { return; }
   atomicStore(&solve.stray, 0u);
   clock.stray = 0.0;
 }
