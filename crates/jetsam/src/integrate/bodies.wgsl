@@ -16,10 +16,10 @@ fn first_kick() -> f32 { return select(clock.part, 0.5 * clock.part, LEAPFROG); 
 // E20: half a kick.
 fn half_kicked(b: Body) -> Body {
   var now = b;
-  let v = kept(b.v.xyz, b.v_rest.xyz, first_kick() * b.x.w * b.force.xyz);
+  let p = kept(b.p.xyz, b.p_rest.xyz, first_kick() * b.force.xyz);
   let l = kept(b.l.xyz, b.l_rest.xyz, first_kick() * b.torque.xyz);
-  now.v_half = vec4<f32>(v.sum, 0.0);
-  now.v_rest = vec4<f32>(v.rest, 0.0);
+  now.p_half = vec4<f32>(p.sum, 0.0);
+  now.p_rest = vec4<f32>(p.rest, 0.0);
   now.l_half = vec4<f32>(l.sum, 0.0);
   now.l_rest = vec4<f32>(l.rest, 0.0);
   return now;
@@ -29,8 +29,8 @@ fn half_kick_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups
   let k = number(g, n, l, 64u);
   if (!moving() || k >= movers() || clock.drag > 0.0 || !moves(bodies[k])) { return; }
   let b = half_kicked(bodies[k]);
-  bodies[k].v_half = b.v_half;
-  bodies[k].v_rest = b.v_rest;
+  bodies[k].p_half = b.p_half;
+  bodies[k].p_rest = b.p_rest;
   bodies[k].l_half = b.l_half;
   bodies[k].l_rest = b.l_rest;
 }
@@ -52,17 +52,19 @@ fn drift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   if (HAS_JOINTS == 0u) { b = half_kicked(b); }   // else joints have corrected it meanwhile
   let dt = clock.part;
   let rest = dt - first_kick();
-  let moved_x = kept(b.x.xyz, b.rest.xyz, dt * b.v_half.xyz);
+  let moved_x = kept(b.x.xyz, b.rest.xyz, dt * b.p_half.xyz / b.rest.w);
   let q = turned_body(b, b.l_half.xyz, dt);
   let now = b.l_half.xyz + rest * b.torque.xyz;
   bodies[k].x = vec4<f32>(home_all(moved_x.sum), b.x.w);
   bodies[k].rest = vec4<f32>(moved_x.rest, b.rest.w);
   bodies[k].q = q;
-  bodies[k].v_rest = b.v_rest;
+  bodies[k].p_rest = b.p_rest;
   bodies[k].l_rest = b.l_rest;
-  bodies[k].v_half = b.v_half;
+  bodies[k].p_half = b.p_half;
   bodies[k].l_half = b.l_half;
-  bodies[k].v = vec4<f32>(b.v_half.xyz + rest * b.x.w * b.force.xyz, 0.0);
+  let p = b.p_half.xyz + rest * b.force.xyz;
+  bodies[k].p = vec4<f32>(p, 0.0);
+  bodies[k].v = vec4<f32>(p / b.rest.w, 0.0);
   bodies[k].l = vec4<f32>(now, 0.0);
   bodies[k].omega = vec4<f32>(spin(b, q, now), 0.0);
   if (IMPLICIT) { swept[k].impulse += first_kick() * swept[k].outside; }
@@ -155,11 +157,12 @@ fn kick_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
 fn kick_body(k: u32, force: vec3<f32>, torque: vec3<f32>) {
   if (!LEAPFROG) { return; }
   let b = bodies[k];
-  let v = kept(b.v_half.xyz, b.v_rest.xyz, 0.5 * clock.part * b.x.w * force);
+  let p = kept(b.p_half.xyz, b.p_rest.xyz, 0.5 * clock.part * force);
   let l = kept(b.l_half.xyz, b.l_rest.xyz, 0.5 * clock.part * torque);
-  bodies[k].v_rest = vec4<f32>(v.rest, 0.0);
+  bodies[k].p_rest = vec4<f32>(p.rest, 0.0);
   bodies[k].l_rest = vec4<f32>(l.rest, 0.0);
-  bodies[k].v = vec4<f32>(v.sum, 0.0);
+  bodies[k].p = vec4<f32>(p.sum, 0.0);
+  bodies[k].v = vec4<f32>(p.sum / b.rest.w, 0.0);
   bodies[k].l = vec4<f32>(l.sum, 0.0);
   bodies[k].omega = vec4<f32>(spin(b, b.q, l.sum), 0.0);
 }

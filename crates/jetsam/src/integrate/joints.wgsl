@@ -37,7 +37,7 @@ fn end_later(k: u32, anchor: vec3<f32>) -> End {
   if (e.moves) {
     let b = bodies[k];
     e.q = turned_body(b, b.l_half.xyz, clock.part);
-    e.v = b.v_half.xyz;
+    e.v = b.p_half.xyz / b.rest.w;
   } else { e.v = vec3<f32>(0.0); }
   return e;
 }
@@ -117,18 +117,19 @@ fn give_one(e: End, push: vec3<f32>, turn: vec3<f32>, half: bool) {
   let b = bodies[e.body];
   let l = cross(e.arm, push) + turn;
   if (half) {
-    let v = kept(b.v_half.xyz, b.v_rest.xyz, b.x.w * push);
+    let p = kept(b.p_half.xyz, b.p_rest.xyz, push);
     let l_half = kept(b.l_half.xyz, b.l_rest.xyz, l);
-    bodies[e.body].v_half = vec4<f32>(v.sum, 0.0);
+    bodies[e.body].p_half = vec4<f32>(p.sum, 0.0);
     bodies[e.body].l_half = vec4<f32>(l_half.sum, 0.0);
-    bodies[e.body].v_rest = vec4<f32>(v.rest, 0.0);
+    bodies[e.body].p_rest = vec4<f32>(p.rest, 0.0);
     bodies[e.body].l_rest = vec4<f32>(l_half.rest, 0.0);
   } else {
-    let v = kept(b.v.xyz, b.v_rest.xyz, b.x.w * push);
+    let p = kept(b.p.xyz, b.p_rest.xyz, push);
     let now = kept(b.l.xyz, b.l_rest.xyz, l);
-    bodies[e.body].v = vec4<f32>(v.sum, 0.0);
+    bodies[e.body].p = vec4<f32>(p.sum, 0.0);
+    bodies[e.body].v = vec4<f32>(p.sum / b.rest.w, 0.0);
     bodies[e.body].l = vec4<f32>(now.sum, 0.0);
-    bodies[e.body].v_rest = vec4<f32>(v.rest, 0.0);
+    bodies[e.body].p_rest = vec4<f32>(p.rest, 0.0);
     bodies[e.body].l_rest = vec4<f32>(now.rest, 0.0);
     bodies[e.body].omega = vec4<f32>(spin(b, b.q, now.sum), 0.0);
   }

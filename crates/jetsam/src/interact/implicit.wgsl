@@ -334,13 +334,14 @@ fn shift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   swept[k].added_torque += by.twist;
   if (!moves(b) || b.stated.w > 0.0) { swept[k].impulse -= dt * by.thrust; }
   if (!yields(b) || !COUPLED_BY_PRESSURE) { return; }
-  let v = kept(b.v_half.xyz, b.v_rest.xyz, dt * by.push.xyz);
+  let p = kept(b.p_half.xyz, b.p_rest.xyz, dt * by.thrust.xyz);
   let l_half = kept(b.l_half.xyz, b.l_rest.xyz, dt * by.twist.xyz);
   let x = kept(b.x.xyz, b.rest.xyz, dt * dt * by.push.xyz);
-  bodies[k].v_half = vec4<f32>(v.sum, 0.0);
-  bodies[k].v_rest = vec4<f32>(v.rest, 0.0);
+  bodies[k].p_half = vec4<f32>(p.sum, 0.0);
+  bodies[k].p_rest = vec4<f32>(p.rest, 0.0);
   bodies[k].l_half = vec4<f32>(l_half.sum, 0.0);
   bodies[k].l_rest = vec4<f32>(l_half.rest, 0.0);
+  bodies[k].p = b.p + dt * by.thrust;
   bodies[k].v = b.v + dt * by.push;
   bodies[k].l = b.l + dt * by.twist;
   bodies[k].omega = vec4<f32>(spin(b, b.q, b.l.xyz + dt * by.twist.xyz), 0.0);

@@ -60,10 +60,11 @@ struct Body {
   omega: vec4<f32>,
   acceleration: vec4<f32>,            // of scripts, else 0
   angular_acceleration: vec4<f32>,
-  v_half: vec4<f32>,
+  p: vec4<f32>,           // momentum: sums of what bodies exchange cancel to the last bit
+  p_half: vec4<f32>,
   l: vec4<f32>,
   l_half: vec4<f32>,
-  v_rest: vec4<f32>,      // what rounding left over of v and l
+  p_rest: vec4<f32>,      // what rounding left over of both
   l_rest: vec4<f32>,
   inertia_x: vec4<f32>,   // columns of the inverse inertia in the body's axes
   inertia_y: vec4<f32>,
@@ -197,9 +198,10 @@ struct Rule {
   body: vec4<f32>,      // size, clearance, contact diameter, margin of solid sides
   matter: vec4<f32>,    // mass (0: none), half_area, margin of open sides, distance behind the leader
   time: vec4<f32>,      // now, until the next decision, between decisions
-  kind: vec4<u32>,      // 0 Reynolds, 1 Couzin, 2 Vicsek; first agent; agents; relations, two bits a flock
+  kind: vec4<u32>,      // 0 Reynolds, 1 Couzin, 2 Vicsek; first agent; agents
   who: vec4<u32>,       // leader or GONE; 1 keeps to fluids, 2 flees bodies, 4 flees fluids; seed
   count: vec4<u32>,     // decisions, due, topological neighbours
+  relations: vec4<u32>, // two bits a flock
 }
 struct Agent {
   x: vec4<f32>,         // w: id (bits)

@@ -16,6 +16,8 @@ pub const PART: usize = 128;
 pub const BLOCK: u32 = 2048;
 /// Bins behind the cells of a kind.
 pub const BINS: u32 = 4;
+/// Most flocks: two bits for each in a rule.
+pub const FLOCKS: usize = 64;
 /// A particle of a body that is outside the domain.
 pub const GONE: u32 = u32::MAX;
 
@@ -62,10 +64,11 @@ pub struct Drifted {
 #[repr(C)]
 pub struct GpuBody {
     pub pose: Pose,
-    pub v_half: V,
+    pub p: V,
+    pub p_half: V,
     pub l: V,
     pub l_half: V,
-    pub v_rest: V,
+    pub p_rest: V,
     pub l_rest: V,
     pub inertia: [V; 3],
     pub force: V,
@@ -377,6 +380,11 @@ pub fn pose(body: &Body) -> Pose {
     }
 }
 
+/// What rounding to single precision leaves over: to be taken from what is kept.
+fn left_over(v: DVec3) -> DVec3 {
+    v.as_vec3().as_dvec3() - v
+}
+
 /// Bodies with the parts that `first` and `count` tell.
 pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> {
     let body = |(k, b): (usize, &Body)| {
@@ -385,12 +393,17 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
         let first = parts.iter().position(|p| p[0] == k as u32).unwrap_or(0);
         let count = b.slots.len().div_ceil(PART);
         let radius = state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max);
+        let mass = if b.is_static() { 0.0 } else { b.mass };
+        let p = mass * b.v;
         let particle = if b.is_static() { 0.0 } else { b.mass / b.slots.len().max(1) as f64 };
         GpuBody {
             pose: pose(b),
-            v_half: single(b.v_half, 0.0),
+            p: single(p, 0.0),
+            p_half: single(mass * b.v_half, 0.0),
             l: single(b.l, 0.0),
             l_half: single(b.l_half, 0.0),
+            p_rest: single(left_over(p), 0.0),
+            l_rest: single(left_over(b.l), 0.0),
             inertia: [single(inertia.x_axis, radius as f32), single(inertia.y_axis, 0.0), single(inertia.z_axis, 0.0)],
             force: single(b.force, b.sharers),
             torque: single(b.torque, 0.0),
@@ -413,8 +426,9 @@ pub fn to_body(from: &GpuBody, body: &mut Body) {
     if !body.is_static() {
         body.x = double(p.x) - double(p.rest);
         body.q = DQuat::from_array(p.q.map(f64::from));
-        (body.v, body.omega) = (double(p.v), double(p.omega));
-        (body.l, body.v_half, body.l_half) = (double(from.l), double(from.v_half), double(from.l_half));
+        (body.v, body.omega) = ((double(from.p) - double(from.p_rest)) / body.mass, double(p.omega));
+        (body.l, body.l_half) = (double(from.l) - double(from.l_rest), double(from.l_half));
+        body.v_half = double(from.p_half) / body.mass;
         body.sharers = from.force[3];
     }
     (body.force, body.torque) = (double(from.force), double(from.torque));
@@ -481,6 +495,7 @@ pub struct Rule {
     pub kind: [u32; 4],
     pub who: [u32; 4],
     pub count: [u32; 4],
+    pub relations: [u32; 4],
 }
 
 /// `Crowd` without its rules.
@@ -548,7 +563,10 @@ pub fn crowd(model: &Model, state: &State, sizes: Sizes) -> Vec<u8> {
 
 fn rule(model: &Model, f: &FlockConstants, clock: &crate::state::Clock) -> Rule {
     let (u, w) = (&f.limits, &f.weights);
-    let relations = f.relations.iter().enumerate().map(|(k, r)| (*r as u32) << (2 * k)).sum();
+    let mut relations = [0; 4];
+    for (k, relation) in f.relations.iter().enumerate().take(FLOCKS) {
+        relations[k / 16] |= (*relation as u32) << (2 * (k % 16));
+    }
     let flags = u32::from(f.keep_to_fluids) | u32::from(f.flee_bodies) << 1 | u32::from(f.flee_fluids) << 2;
     let matter = f.matter.map_or([0.0; 2], |m| [m.mass, m.half_area]);
     Rule {
@@ -567,9 +585,10 @@ fn rule(model: &Model, f: &FlockConstants, clock: &crate::state::Clock) -> Rule 
         ],
         matter: [matter[0], matter[1], f.margin[1], f.leader.map_or(0.0, |l| l.1)],
         time: [clock.time as f32, clock.wait as f32, f.tau as f32, 0.0],
-        kind: [f.model as u32, f.first as u32, f.count as u32, relations],
+        kind: [f.model as u32, f.first as u32, f.count as u32, 0],
         who: [f.leader.map_or(GONE, |l| l.0 as u32), flags, f.seed as u32, (f.seed >> 32) as u32],
         count: [clock.decisions as u32, 0, f.neighbours as u32, 0],
+        relations,
         ..Rule::default()
     }
 }
@@ -642,15 +661,16 @@ mod tests {
         same!("Agent", Agent, x, v, next, rest, force, drag, own, felt);
         same!(
             "Rule", Rule, lead_x, lead_v, goal, radii, limits, pull, drive, fear, sense, body, matter, time, kind, who,
-            count
+            count, relations
         );
         same!(
             "Body",
             GpuBody,
-            v_half,
+            p,
+            p_half,
             l,
             l_half,
-            v_rest,
+            p_rest,
             l_rest,
             force,
             torque,

@@ -89,13 +89,7 @@ struct Timers {
 
 /// Why a scene cannot run on a GPU yet, in words.
 pub fn unsupported(model: &Model) -> Option<&'static str> {
-    if model.flocks.len() > 16 {
-        return Some("more than sixteen flocks");
-    }
-    if model.flocks.iter().any(|f| f.neighbours > 16) {
-        return Some("more than sixteen topological neighbours");
-    }
-    None
+    (model.flocks.len() > layout::FLOCKS).then_some("more than sixty-four flocks")
 }
 
 impl OnGpu {

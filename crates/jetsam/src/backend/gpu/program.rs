@@ -341,6 +341,7 @@ pub fn text(model: &Model) -> String {
         ("HAS_HOSES", hoses(model).count()),
         ("DRAINS", model.drains.len().max(1)),
         ("HAS_DRAINS", model.drains.len()),
+        ("NEAREST", model.flocks.iter().map(|f| f.neighbours).max().unwrap_or(0).max(1)),
         ("HAS_JOINTS", model.joints.len()),
         ("BY_SOUND", bound_code(DtBound::Sound)),
         ("BY_FORCE", bound_code(DtBound::Force)),
