@@ -39,7 +39,10 @@ fn main() -> ExitCode {
         ("fish_agree_in_water", fish_agree_in_water),
         ("implicit_stages_agree", implicit_stages_agree),
         ("a_hundred_implicit_steps_agree", a_hundred_implicit_steps_agree),
-        ("implicit_rounds_end_at_the_tolerance_or_at_the_budget", implicit_rounds_end_at_the_tolerance_or_at_the_budget),
+        (
+            "implicit_rounds_end_at_the_tolerance_or_at_the_budget",
+            implicit_rounds_end_at_the_tolerance_or_at_the_budget,
+        ),
         ("implicit_momentum_is_exchanged_and_kept", implicit_momentum_is_exchanged_and_kept),
         ("implicit_momentum_is_impulse", implicit_momentum_is_impulse),
         ("an_implicit_tank_weighs_what_its_water_weighs", an_implicit_tank_weighs_what_its_water_weighs),
@@ -743,7 +746,8 @@ fn implicit_stages_agree_in(text: &str, before: usize) {
     }
 }
 
-/// Fluids and bodies after a stage of implicit pressure; bars are fractions of the largest value of a field.
+/// Fluids and bodies after a stage of implicit pressure; bars are fractions of the largest value of a field. The CPU keeps vectors to
+/// neighbours in sixteen bits while it iterates, the GPU makes them anew.
 fn compare_implicit(stage: Stage, cpu: &State, gpu: &State) {
     let (a, b) = (&cpu.particles, &gpu.particles);
     assert_eq!(a.count, b.count, "{stage:?}: counts");
@@ -754,14 +758,14 @@ fn compare_implicit(stage: Stage, cpu: &State, gpu: &State) {
         assert!(d <= bar, "{stage:?}: {what} differ by {d} of the largest");
     };
     match stage {
-        Stage::Kick | Stage::Divergence => of("velocities", 1e-4, &|s, k| s.particles.record[k].v),
+        Stage::Kick | Stage::Divergence => of("velocities", 5e-4, &|s, k| s.particles.record[k].v),
         Stage::Cells => {
             assert_eq!(a.id[fluid.clone()], b.id[fluid.clone()], "order");
             of("places", 2e-6, &|s, k| s.particles.record[k].x);
         }
         Stage::Pressure => {
             of("places", 2e-6, &|s, k| s.particles.record[k].x);
-            of("velocities", 1e-4, &|s, k| s.particles.record[k].v);
+            of("velocities", 5e-4, &|s, k| s.particles.record[k].v);
             of("shares", 2e-3, &|s, k| [s.particles.record[k].share, 0.0, 0.0]);
         }
         // after PBF has moved particles the CPU keeps its lists of neighbours, the GPU looks anew
@@ -799,7 +803,12 @@ fn a_hundred_implicit_steps_agree() {
         for (what, x, y) in [("kinetic", a.kinetic, b.kinetic), ("potential", a.potential, b.potential)] {
             assert!((x - y).abs() <= 1e-4 * (a.kinetic + a.potential), "{solver}, {what}: {x} and {y}");
         }
-        assert!((a.momentum - b.momentum).length() <= 1e-3 * a.momentum_scale, "{solver}: {} {}", a.momentum, b.momentum);
+        assert!(
+            (a.momentum - b.momentum).length() <= 1e-3 * a.momentum_scale,
+            "{solver}: {} {}",
+            a.momentum,
+            b.momentum
+        );
         let (a, b) = (&cpu.state().bodies.body[0], &gpu.state().bodies.body[0]);
         assert!((a.x - b.x).length() < 1e-4, "{solver}: {} and {}", a.x, b.x);
         assert!(gpu.momentum_residual() < 1e-4, "{solver}: {}", gpu.momentum_residual());

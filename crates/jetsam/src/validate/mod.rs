@@ -160,7 +160,15 @@ fn simulate(variant: &Variant, backend: Choice, progress: &mut dyn FnMut(f64)) -
             let ran = !matches!(why, GpuError::Scene { .. } | GpuError::Limit { .. });
             let trouble = Some(if ran { format!("not run: {why}") } else { why.to_string() });
             let (series, profiles) = (vec![Series::default(); scene.probe.len()], Vec::new());
-            return Ok(Run { variant: variant.name.clone(), series, profiles, seconds: 0.0, particles: 0, trouble, ran });
+            return Ok(Run {
+                variant: variant.name.clone(),
+                series,
+                profiles,
+                seconds: 0.0,
+                particles: 0,
+                trouble,
+                ran,
+            });
         }
     };
     let mut sampler = Sampler::new(scene, &world)?;

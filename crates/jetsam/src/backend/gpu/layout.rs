@@ -649,9 +649,37 @@ mod tests {
         same!("Slot", Slot, offset, normal, facing, slip, owner, place);
         same!("Touch", Touch, fluid, contact, couple, slip);
         same!(
-            "Clock", Clock, dt, dt_before, left, drag, gravity, fastest, running, step, live, bound, own, time,
-            elapsed, births, born, listed, next_id, crossed, part, parts, at, most_parts, mid, idle, halted, stray, rounds,
-            joint_impulse, joint_force
+            "Clock",
+            Clock,
+            dt,
+            dt_before,
+            left,
+            drag,
+            gravity,
+            fastest,
+            running,
+            step,
+            live,
+            bound,
+            own,
+            time,
+            elapsed,
+            births,
+            born,
+            listed,
+            next_id,
+            crossed,
+            part,
+            parts,
+            at,
+            most_parts,
+            mid,
+            idle,
+            halted,
+            stray,
+            rounds,
+            joint_impulse,
+            joint_force
         );
         same!("Joint", Joint, anchor_a, anchor_b, axis_a, axis_b, across_a, across_b, turn, law, limits, who);
         for (name, bytes) in [("Solve", SOLVE_BYTES), ("Swept", SWEPT_BYTES), ("Node", NODE_BYTES)] {

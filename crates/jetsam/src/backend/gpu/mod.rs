@@ -148,7 +148,8 @@ impl OnGpu {
                 let made = |&&(name, over): &&(&'static str, Over)| wanted(name) && groups(over)[0] > 0;
                 let kernel = |&(name, over)| (program.kernel(gpu, name, &buffers.all), groups(over));
                 let sections = program::sections(stage, solver).iter();
-                let sections = sections.map(|(times, kernels)| (*times, kernels.iter().filter(made).map(kernel).collect()));
+                let sections =
+                    sections.map(|(times, kernels)| (*times, kernels.iter().filter(made).map(kernel).collect()));
                 (stage, sections.collect())
             };
             Ok(Ready {
@@ -454,7 +455,8 @@ impl OnGpu {
         let sections = self.ready.as_ref().map_or(0, |r| r.stages[k].1.len());
         for section in 0..sections {
             let times = self.ready.as_ref().map(|r| r.stages[k].1[section].0);
-            let parts = if times == Some(Times::Parts) { 0..advance.parts - 1 } else { advance.parts - 1..advance.parts };
+            let parts =
+                if times == Some(Times::Parts) { 0..advance.parts - 1 } else { advance.parts - 1..advance.parts };
             for part in parts {
                 if times == Some(Times::Parts) || section + 1 == sections {
                     self.scripts(model, advance.nth_part(part));

@@ -136,8 +136,7 @@ const PUSHED: [(&str, Over); 7] = [
     ("push_bodies", Over::Slots(128)),
 ];
 /// Links of a turn of PBF, and whether it is needed.
-const TURN: &[(&str, Over)] =
-    &[("links", Over::Fluids(128)), ("begin_turn", Over::One), ("seat", Over::Moving(128))];
+const TURN: &[(&str, Over)] = &[("links", Over::Fluids(128)), ("begin_turn", Over::One), ("seat", Over::Moving(128))];
 const TURNED: &[(&str, Over)] = &[
     PUSHED[0],
     PUSHED[1],
@@ -178,13 +177,7 @@ pub fn sections(stage: Stage, solver: Pressure) -> &'static [Section] {
         ],
         (Stage::Drift, _) => &[(
             Once,
-            &[
-                ("drift_fluid", Fluids(128)),
-                DRIFT_BODIES[0],
-                DRIFT_BODIES[1],
-                DRIFT_BODIES[2],
-                ("follow", Slots(128)),
-            ],
+            &[("drift_fluid", Fluids(128)), DRIFT_BODIES[0], DRIFT_BODIES[1], DRIFT_BODIES[2], ("follow", Slots(128))],
         )],
         (Stage::Cells, _) => &[(
             Once,
@@ -259,10 +252,9 @@ pub fn sections(stage: Stage, solver: Pressure) -> &'static [Section] {
         (Stage::Kick, _) => {
             &[(Once, &[("kick_fluid", Fluids(128)), ("kick_bodies", Bodies(64)), ("joints_kick", One)])]
         }
-        (Stage::Ledger, _) => &[(
-            Once,
-            &[("tally", Groups), ("tally_bodies", Groups), ("tally_agents", Agents(128)), ("total", One)],
-        )],
+        (Stage::Ledger, _) => {
+            &[(Once, &[("tally", Groups), ("tally_bodies", Groups), ("tally_agents", Agents(128)), ("total", One)])]
+        }
         (Stage::Agents, _) => &[(
             Once,
             &[
@@ -370,8 +362,39 @@ pub fn text(model: &Model) -> String {
     let (w, g) = (shape(model.kernel.density()), shape(model.kernel.force()));
     let _ = writeln!(text, "fn density_w(s: f32) -> f32 {{ return {w}_w(s); }}");
     let _ = writeln!(text, "fn force_g(s: f32) -> f32 {{ return {g}_g(s); }}");
-    for part in TEXTS {
-        text.push_str(part);
+    if let Ok(root) = std::env::var("JETSAM_WGSL") {
+        let files = [
+            "laws/kernel",
+            "laws/fluid",
+            "laws/contact",
+            "laws/field",
+            "laws/implicit",
+            "laws/flock",
+            "backend/gpu/common",
+            "integrate/particles",
+            "integrate/bodies",
+            "interact/cells",
+            "integrate/sources",
+            "interact/density",
+            "interact/boundary",
+            "interact/gradients",
+            "interact/contacts",
+            "interact/forces",
+            "backend/gpu/ledger",
+            "interact/links",
+            "interact/implicit",
+            "backend/gpu/parts",
+            "integrate/joints",
+            "flock/agents",
+            "flock/decide",
+        ];
+        for f in files {
+            text.push_str(&std::fs::read_to_string(format!("{root}/{f}.wgsl")).unwrap_or_default());
+        }
+    } else {
+        for part in TEXTS {
+            text.push_str(part);
+        }
     }
     let scan = include_str!("scan.wgsl");
     let [name, counts, starts, blocks, total] = ["NAME", "COUNTS", "STARTS", "BLOCKS", "TOTAL"];

@@ -1,8 +1,8 @@
 //! Buffers of a world on the device, and the ways of a state there and back.
 
 use super::layout::{
-    self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, GONE, GpuBody, Joint, NODE_BYTES, Rule, SOLVE_BYTES, SWEPT_BYTES, Sizes,
-    Slot, Sums, Touch, three, vec, with,
+    self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, GONE, GpuBody, Joint, NODE_BYTES, Rule, SOLVE_BYTES, SWEPT_BYTES,
+    Sizes, Slot, Sums, Touch, three, vec, with,
 };
 use super::program::{hoses, mortal};
 use crate::gpu::{Gpu, GpuError};
