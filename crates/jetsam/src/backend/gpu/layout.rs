@@ -414,7 +414,6 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
             law: [c.ln_restitution, c.shared_by, c.face, c.friction],
             stated: [c.stiffness, c.damping, particle as f32, f32::from(b.one_way)],
             counts: [b.contacts, 0, first as u32, count as u32],
-            ..GpuBody::default()
         }
     };
     state.bodies.body.iter().enumerate().map(body).collect()
