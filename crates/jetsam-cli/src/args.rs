@@ -166,8 +166,12 @@ pub struct PictureArgs {
 #[command(next_help_heading = "Looks")]
 pub struct StyleArgs {
     /// How fluids are drawn.
-    #[arg(long, value_parser = one_of(&style::Fluid::ALL), default_value = "balls", value_name = "balls|points|surface|hidden")]
+    #[arg(long, value_parser = one_of(&style::Fluid::ALL), default_value = "balls", value_name = "balls|points|surface|sprites|hidden")]
     pub fluid: style::Fluid,
+    /// What stands for a particle with --fluid sprites: a PNG file, in place of a drop. Multiplied with its colour; clear where the alpha
+    /// is below one half.
+    #[arg(long, value_name = "FILE")]
+    pub sprite: Option<PathBuf>,
     /// How the surface of a fluid is smoothed.
     #[arg(long, value_parser = one_of(&style::Smoothing::ALL), default_value = "narrow-range", value_name = "narrow-range|bilateral|curvature-flow|none")]
     pub smoothing: style::Smoothing,
@@ -189,6 +193,9 @@ pub struct StyleArgs {
     /// What arrows show: the velocity, or the force over the mass.
     #[arg(long, value_parser = one_of(&style::Arrows::ALL), default_value = "velocity", value_name = "velocity|force")]
     pub arrows_of: style::Arrows,
+    /// Lines: where particles and agents were, or along the velocity of the fluid at this instant.
+    #[arg(long, value_parser = one_of(&style::Lines::ALL), default_value = "none", value_name = "none|trails|streamlines")]
+    pub lines: style::Lines,
     /// Two pictures side by side, one for each eye.
     #[arg(long)]
     pub stereo: bool,
@@ -199,9 +206,14 @@ pub struct StyleArgs {
 
 impl StyleArgs {
     /// The choices for the GPU's renderer.
-    pub fn style(&self) -> style::Style {
-        style::Style {
+    ///
+    /// # Errors
+    /// A sprite that cannot be read, or that nothing is drawn as.
+    pub fn style(&self) -> miette::Result<style::Style> {
+        Ok(style::Style {
             fluid: self.fluid,
+            sprite: self.sprite()?,
+            lines: self.lines,
             smoothing: self.smoothing,
             bodies: if self.body_particles { style::Bodies::Particles } else { style::Bodies::Meshes },
             color: self.color,
@@ -212,7 +224,18 @@ impl StyleArgs {
             stereo: if self.stereo { 1.0 } else { 0.0 },
             samples: self.samples,
             ..style::Style::default()
+        })
+    }
+
+    fn sprite(&self) -> miette::Result<jetsam_view::Sprite> {
+        let Some(path) = &self.sprite else { return Ok(jetsam_view::Sprite::default()) };
+        if self.fluid != style::Fluid::Sprites {
+            return Err(miette::miette!(help = "add --fluid sprites", "--sprite: nothing is drawn as sprites"));
         }
+        jetsam_view::Sprite::open(path).map_err(|e| {
+            let help = "a sprite is a PNG file of at most 1024 x 1024 pixels; without --sprite a drop is drawn";
+            miette::miette!(help = help, "{e}")
+        })
     }
 }
 
@@ -240,6 +263,13 @@ pub enum Save {
     Vtk,
     /// The bodies' motion and what probes read: bodies.csv, probes.csv.
     Csv,
+}
+
+impl Save {
+    /// Whether it is made of pictures.
+    pub fn is_picture(self) -> bool {
+        matches!(self, Self::Png | Self::Mp4 | Self::Apng)
+    }
 }
 
 #[derive(clap::Args)]
@@ -357,6 +387,12 @@ pub struct Bench {
     /// Compare the solvers of pressure: speed beside density error, for a dam break and for monkey-splash or a scene given.
     #[arg(long, conflicts_with_all = ["list", "particles", "steps"])]
     pub solvers: bool,
+    /// Measure pictures in place of steps: how long the GPU's renderer takes for each style, pass by pass, after so many steps.
+    #[arg(long, conflicts_with = "solvers")]
+    pub pictures: bool,
+    /// With --pictures: width and height in pixels.
+    #[arg(long, requires = "pictures", value_parser = size, default_value = "1280x720", value_name = "WIDTHxHEIGHT")]
+    pub size: [usize; 2],
     /// With --solvers: simulate so long, in place of what is usual for the scene (s).
     #[arg(long, requires = "solvers", value_parser = not_negative)]
     pub seconds: Option<f64>,

@@ -43,6 +43,9 @@ pub fn bench(args: &args::Bench) -> miette::Result<Outcome> {
     if args.solvers {
         return crate::solvers::table(args);
     }
+    if args.pictures {
+        return crate::drawing::pictures(args);
+    }
     let names = match &args.scene {
         Some(scene) => vec![scene.as_str()],
         None => SCENES.iter().map(|s| s.name).collect(),
@@ -74,7 +77,7 @@ pub fn bench(args: &args::Bench) -> miette::Result<Outcome> {
 
 /// The scene with a spacing that gives about so many fluid particles (bodies' where there is no fluid); with flocks alone, so many
 /// agents of as many neighbours as before.
-fn sized(scene: &Scene, wanted: u64) -> miette::Result<Scene> {
+pub fn sized(scene: &Scene, wanted: u64) -> miette::Result<Scene> {
     let mut scene = scene.clone();
     if scene.fluid.is_empty() && scene.rigid.is_empty() {
         return Ok(crowded(scene, wanted));

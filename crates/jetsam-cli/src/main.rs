@@ -7,6 +7,7 @@ mod args;
 mod bench;
 mod check;
 mod devices;
+mod drawing;
 mod output;
 mod run;
 mod scenes;

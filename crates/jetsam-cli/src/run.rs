@@ -2,6 +2,7 @@
 
 use crate::args::Run;
 use crate::output::Outputs;
+use crate::output::pictures::Artist;
 use crate::terminal::{progress, say, seconds, table};
 use crate::{Outcome, terminal};
 use jetsam::{Recorder, Scene, Summary, Trouble, World};
@@ -16,14 +17,16 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     input.set.extend(args.seed.map(|seed| format!("world.seed={seed}")));
     let scene = input.open()?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(name_of(&input.scene)));
-    let (mut world, why) = World::choose(args.backend.into(), scene.assemble().map_err(|e| *e)?)?;
+    let artist = Artist::of(&args.save, &args.pictures)?;
+    let assembly = scene.assemble().map_err(|e| *e)?;
+    let (mut world, why) = World::choose_with(args.backend.into(), artist.gpu(), assembly)?;
     if let Some(why) = why {
         say(&format!("on the processor: {why}"));
     }
     for warning in &world.model().warnings {
         say(&format!("warning: {warning}"));
     }
-    let mut outputs = Outputs::create(&folder, &args.save, &args.pictures, &scene, &world)?;
+    let mut outputs = Outputs::create(&folder, &args.save, (&args.pictures, artist), &scene, &world)?;
     let times = Frames::of(&scene, args);
     let bar = progress(times.count, &name_of(&input.scene).to_string_lossy());
     let mut recorder = Recorder::default();

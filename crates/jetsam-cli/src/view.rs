@@ -23,7 +23,7 @@ pub fn view(args: View) -> miette::Result<Outcome> {
         scene,
         playing: !args.paused,
         backend: args.backend.into(),
-        style: args.style.style(),
+        style: args.style.style()?,
     };
     jetsam_view::window::open(options)?;
     Ok(Outcome::Fine)

@@ -366,6 +366,14 @@ fn wrong_arguments_are_status_2() {
     bad(&dir, &["run", &file, "--size", "1280x721"], &["721", "even"]);
     bad(&dir, &["run", &file, "--color", "taste"], &["speed, density"]);
     bad(&dir, &["run", &file, "--fluid", "surface", "--renderer", "cpu"], &["help: "]);
+    bad(&dir, &["run", &file, "--lines", "cobwebs"], &["none, trails, streamlines"]);
+    bad(&dir, &["run", &file, "--lines", "trails", "--renderer", "cpu"], &["help: "]);
+    let sprites =
+        |sprite| bad(&dir, &["run", &file, "--fluid", "sprites", "--sprite", sprite], &[sprite, "PNG", "help: "]);
+    sprites("gone.png");
+    sprites("scene.toml");
+    bad(&dir, &["run", &file, "--sprite", "gone.png"], &["--fluid sprites"]);
+    bad(&dir, &["bench", "--size", "64x48"], &["--pictures"]);
     bad(&dir, &["run", &file, "--save", "gif"], &["gif"]);
     bad(&dir, &["run", &file, "--seconds", "-1"], &["seconds"]);
     bad(&dir, &["run", &file, "--threads", "0"], &["threads"]);

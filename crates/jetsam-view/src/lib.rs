@@ -22,11 +22,15 @@ mod frame;
 pub mod gpu;
 mod image;
 mod legend;
+mod lines;
 mod paint;
 mod raster;
 pub mod show;
 mod splat;
+mod sprite;
+mod streamlines;
 pub mod style;
+mod trails;
 #[cfg(feature = "window")]
 pub mod window;
 
@@ -35,7 +39,10 @@ pub use camera::Camera;
 pub use frame::Frame;
 pub use image::{Image, ImageError};
 pub use legend::{legend, number};
+pub use lines::Curves;
 pub use paint::paint;
 pub use show::Show;
 pub use splat::{Ball, Facet, Line, Options, box_edges, facets, render};
+pub use sprite::{Sprite, SpriteError};
+pub use streamlines::streamlines;
 pub use style::Style;

@@ -25,6 +25,8 @@ pub struct Show {
     pub camera: Camera,
     /// Corners of the domain (m).
     pub bounds: [Vec3; 2],
+    /// Axes along which what leaves on one side comes back on the other.
+    pub periodic: [bool; 3],
     /// Edges of the domain, where it has walls.
     pub edges: Vec<Line>,
     /// Height of the ground (m), where there is one.
@@ -114,6 +116,7 @@ impl Show {
         Self {
             camera,
             bounds: [min, max],
+            periodic: scene.domain.walls.map(|wall| wall == Wall::Periodic),
             edges: if bounded { box_edges(min, max, EDGES).into() } else { Vec::new() },
             ground: solid_floor.then_some(min.z),
             spacing: model.spacing as f32,

@@ -1,5 +1,6 @@
 //! What the user chooses about a picture.
 
+use crate::Sprite;
 use crate::color::Map;
 
 /// How fluids are drawn.
@@ -12,14 +13,21 @@ pub enum Fluid {
     Points,
     /// As water: a surface found in screen space.
     Surface,
+    /// As small pictures that face the eye.
+    Sprites,
     /// Not at all.
     Hidden,
 }
 
 impl Fluid {
     /// All of them, with their names.
-    pub const ALL: [(Fluid, &str); 4] =
-        [(Fluid::Balls, "balls"), (Fluid::Points, "points"), (Fluid::Surface, "surface"), (Fluid::Hidden, "hidden")];
+    pub const ALL: [(Fluid, &str); 5] = [
+        (Fluid::Balls, "balls"),
+        (Fluid::Points, "points"),
+        (Fluid::Surface, "surface"),
+        (Fluid::Sprites, "sprites"),
+        (Fluid::Hidden, "hidden"),
+    ];
 }
 
 /// How rigid and static bodies are drawn.
@@ -104,6 +112,24 @@ impl Arrows {
     pub const ALL: [(Arrows, &str); 2] = [(Arrows::Velocity, "velocity"), (Arrows::Force, "force")];
 }
 
+/// Lines that show how things move. Fluid as balls or sprites is drawn smaller where there are any: they would not be seen in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lines {
+    /// None.
+    #[default]
+    None,
+    /// Where some particles and agents were.
+    Trails,
+    /// Along the velocity of the fluid at this instant.
+    Streamlines,
+}
+
+impl Lines {
+    /// All of them, with their names.
+    pub const ALL: [(Lines, &str); 3] =
+        [(Lines::None, "none"), (Lines::Trails, "trails"), (Lines::Streamlines, "streamlines")];
+}
+
 /// All choices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Style {
@@ -131,8 +157,10 @@ pub struct Style {
     pub arrows_of: Arrows,
     /// Every so many particles has an arrow.
     pub arrow_every: u32,
-    /// Lines where particles were.
-    pub trails: bool,
+    /// Lines that show how things move.
+    pub lines: Lines,
+    /// What stands for a particle of fluid drawn as sprites.
+    pub sprite: Sprite,
     /// Whether the sun throws shadows.
     pub shadows: bool,
     /// Edge of the sun's depth map in texels.
@@ -164,7 +192,8 @@ impl Default for Style {
             arrows: 0.0,
             arrows_of: Arrows::default(),
             arrow_every: 1,
-            trails: false,
+            lines: Lines::default(),
+            sprite: Sprite::default(),
             shadows: true,
             shadow_size: 2048,
             crevices: 14,
@@ -187,6 +216,11 @@ impl Style {
             ColorBy::Pressure => [0.0, show.pressure],
             _ => [0.0, show.fast],
         })
+    }
+
+    /// Whether the particles have to be on the host: lines are made there, and what the forces on bodies' particles amount to.
+    pub fn at_home(&self) -> bool {
+        self.lines != Lines::None || self.arrows > 0.0 && self.arrows_of == Arrows::Force
     }
 
     /// Exponent of the scale: slow water is told apart better than fast water.

@@ -8,15 +8,15 @@ use jetsam::gpu::{Gpu, devices};
 use jetsam::state::Record;
 use jetsam::{Scene, World};
 use jetsam_view::gpu::Studio;
-use jetsam_view::style::{Bodies, ColorBy, Fluid, Smoothing, Style};
-use jetsam_view::{Camera, Frame, Image, Show, color, paint};
+use jetsam_view::style::{Bodies, ColorBy, Fluid, Lines, Smoothing, Style};
+use jetsam_view::{Camera, Curves, Frame, Image, Show, Sprite, color, paint};
 use libtest_mimic::{Arguments, Trial, run};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::{LazyLock, Mutex};
 
 fn main() -> ExitCode {
-    let tests: [(&str, fn()); 9] = [
+    let tests: [(&str, fn()); 12] = [
         ("a_ball_covers_its_outline", a_ball_covers_its_outline),
         ("colours_are_those_of_the_scale", colours_are_those_of_the_scale),
         ("nearer_hides_farther", nearer_hides_farther),
@@ -24,8 +24,11 @@ fn main() -> ExitCode {
         ("water_absorbs_by_beer_and_lambert", water_absorbs_by_beer_and_lambert),
         ("smoothing_flattens_a_layer_of_balls", smoothing_flattens_a_layer_of_balls),
         ("two_eyes_agree_where_they_look", two_eyes_agree_where_they_look),
+        ("sprites_are_textured_squares", sprites_are_textured_squares),
+        ("sprites_hide_by_the_depth_of_their_centres", sprites_hide_by_the_depth_of_their_centres),
         ("golden_pictures", golden_pictures),
         ("lent_buffers_are_drawn_as_they_are", lent_buffers_are_drawn_as_they_are),
+        ("a_simulation_on_the_device_is_drawn_from_its_buffers", a_simulation_on_the_device_is_drawn_from_its_buffers),
     ];
     let absent = devices().is_empty();
     let required = std::env::var("JETSAM_REQUIRE_GPU").is_ok_and(|v| v == "1");
@@ -257,6 +260,100 @@ fn two_eyes_agree_where_they_look() {
     }
 }
 
+/// A sprite whose right half is clear, and whose lower half is half as bright.
+fn flag() -> Sprite {
+    let texel = |k: usize| {
+        let tone = if k < 32 { 255 } else { color::byte(0.5) };
+        [tone, tone, tone, if k % 8 < 4 { 255 } else { 0 }]
+    };
+    Sprite::of(Image { width: 8, height: 8, rgba: (0..64).flat_map(texel).collect() })
+}
+
+fn of_sprites(radius: f32) -> Style {
+    let (fluid, range) = (Fluid::Sprites, Some([0.0, 1.0]));
+    Style { fluid, sprite: flag(), radius: Some(radius / 0.1), map: color::Map::Viridis, range, ..plain() }
+}
+
+/// What a sprite of a speed shows as at a brightness, in bytes of sRGB: no light falls on it.
+fn shown(style: &Style, speed: f32, bright: f32) -> [u8; 4] {
+    let [r, g, b] = style.map.at(speed.powf(style.gamma())).map(|c| color::byte(bright * c));
+    [r, g, b, 255]
+}
+
+fn sprites_are_textured_squares() {
+    let show = bare();
+    let empty = background(&show);
+    for (x, z, speed) in [(0.0, 0.0, 0.5), (0.9, 0.5, 1.0), (-1.1, -0.6, 0.1)] {
+        let (center, r) = (Vec3::new(x, 2.5, z), 0.35f32);
+        let style = of_sprites(r);
+        let image = picture(&show, &drops(&[(center, speed)]), &style);
+        let mut counted = [0; 3];
+        for j in 0..HEIGHT as usize {
+            for i in 0..WIDTH as usize {
+                // where the line of sight meets the plane through the centre, in radii to the right and up
+                let slope = (vec2(i as f32, j as f32) + 0.5 - vec2(160.0, 120.0)) / 240.0;
+                let at = (2.5 * vec2(slope.x, -slope.y) - vec2(x, z)) / r;
+                // a pixel on an edge may be either, half a texel from one inside the picture is between
+                let (edge, blend) = (0.03, 0.14);
+                if (at.abs().max_element() - 1.0).abs() < edge || at.abs().min_element() < blend {
+                    continue;
+                }
+                let inside = at.abs().max_element() < 1.0 && at.x < 0.0;
+                let wanted = match (inside, at.y > 0.0) {
+                    (false, _) => empty.pixel(i, j),
+                    (true, upper) => shown(&style, speed, if upper { 1.0 } else { 0.5 }),
+                };
+                counted[if !inside {
+                    0
+                } else if at.y > 0.0 {
+                    1
+                } else {
+                    2
+                }] += 1;
+                let seen = image.pixel(i, j);
+                assert!(!differs(seen, wanted), "{seen:?} at {i}, {j}, where {wanted:?} was expected");
+            }
+        }
+        assert!(counted.iter().all(|n| *n > 600), "{counted:?}");
+    }
+}
+
+fn sprites_hide_by_the_depth_of_their_centres() {
+    let show = bare();
+    let style = of_sprites(0.35);
+    let (near, far) = ((Vec3::new(0.0, 2.0, 0.0), 0.0), (Vec3::new(0.2, 2.2, 0.0), 1.0));
+    for order in [[near, far], [far, near]] {
+        let image = picture(&show, &drops(&order), &style);
+        // the near one covers 160 - 42 .. 160, the far one 160 - 16 .. 160 + 22: left of the middle only the near one is seen
+        assert!(!differs(image.pixel(150, 100), shown(&style, 0.0, 1.0)));
+        // where the near one is clear the far one shows
+        assert!(!differs(image.pixel(168, 100), shown(&style, 1.0, 1.0)));
+    }
+}
+
+/// A simulation on the device that draws: nothing has to come home for its picture, and lines are there if it does.
+fn a_simulation_on_the_device_is_drawn_from_its_buffers() {
+    let scene = Scene::open("monkey-splash", &["resolution.spacing=0.08".into(), "rigid.0.copies.count=3".into()]);
+    let scene = scene.unwrap().with(&["solver.pressure=wcsph".into(), "rigid.0.position=[0, 0, 0.9]".into()]).unwrap();
+    let gpu = GPU.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone();
+    let (mut world, _) = World::choose_with(jetsam::Choice::Gpu, Some(&gpu), scene.assemble().unwrap()).unwrap();
+    assert!(world.run_to(0.2).is_none());
+    let show = Show::new(&scene, &world, WIDTH as f32 / HEIGHT as f32);
+    let (mut lent, home) = (Frame::default(), Frame::of(&world));
+    lent.borrow(&world);
+    assert!(lent.lent.is_some() && lent.record.is_empty() && !home.record.is_empty());
+    for (color, bodies) in [(ColorBy::Speed, Bodies::Meshes), (ColorBy::Pressure, Bodies::Particles)] {
+        let style = Style { color, bodies, arrows: 0.05, ..Style::default() };
+        assert!(!style.at_home());
+        assert_eq!(picture(&show, &lent, &style), picture(&show, &home, &style), "{color:?}");
+    }
+    // water that fell begins to move
+    let style = Style { lines: Lines::Streamlines, ..Style::default() };
+    assert!(style.at_home());
+    let lines = |frame: &Frame| Curves::default().lines(&show, frame, &style).len();
+    assert!(lines(&home) > 100 && lines(&lent) == 0, "{} {}", lines(&home), lines(&lent));
+}
+
 /// Buffers that somebody else filled are drawn without a copy.
 fn lent_buffers_are_drawn_as_they_are() {
     use jetsam_view::gpu::Particles;
@@ -300,12 +397,14 @@ fn golden_pictures() {
     let surface = Style { fluid: Fluid::Surface, ..Style::default() };
     let pressure =
         Style { color: ColorBy::Pressure, map: color::Map::Magma, bodies: Bodies::Particles, ..Style::default() };
+    let sprites = Style { fluid: Fluid::Sprites, ..Style::default() };
     let points = Style { fluid: Fluid::Points, color: ColorBy::Owner, ..Style::default() };
     for (name, (show, frame), style) in [
         ("balls", &monkeys, Style::default()),
         ("surface", &monkeys, surface),
         ("pressure", &monkeys, pressure),
         ("points", &monkeys, points),
+        ("sprites", &monkeys, sprites),
         ("school", &school, Style::default()),
         ("dam", &dam, Style::default()),
     ] {

@@ -7,7 +7,7 @@ use crate::laws::kernel::{Kernel, KernelSet};
 use crate::ledger::Ledger;
 use crate::scene::joint::JointModel;
 use crate::scene::motion::{Path, Shake};
-use crate::scene::{Density, Force, Pressure, Solver, Viscosity};
+use crate::scene::{Damping, Density, Force, Pressure, Solver, Viscosity};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -319,6 +319,11 @@ impl Model {
         let mass = self.reduced_mass(a, b);
         let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
         if dt > 0.0 { mass / (dt * a.face.max(b.face)) } else { 0.0 }
+    }
+
+    /// Whether any body rubs (E13).
+    pub fn rubs(&self) -> bool {
+        self.solver.damping == Damping::Normal && self.contacts.iter().any(|c| c.inverse_mass > 0.0 && c.friction > 0.0)
     }
 
     /// Tangential spring (N/m), its dashpot (N s/m) and friction of one contact of bodies `a` and `b` with the normal

@@ -50,14 +50,51 @@ pub struct Touch {
     pub contact: [f32; 3],
     /// Couple of the contact forces (N m): they act at the middle between two particles, not at this one's centre.
     pub couple: [f32; 3],
-    /// Tangential displacement of what it touches, as far as friction holds it (m), E13.
-    pub slip: [f32; 3],
+    /// Which of the chunk's slips are its own, counted from 1; 0 where friction holds nothing.
+    pub slips: u32,
     /// Particles it touches.
     pub contacts: u32,
     /// Their parts, summed: beside each other the particles of a face share one contact.
     pub sharers: f32,
     /// Of these, how many are so deep that they would pass through.
     pub deep: u32,
+}
+
+/// Contacts whose slip one particle remembers: those that bear most.
+pub const HELD_CONTACTS: usize = 8;
+
+/// Slips of the contacts of one particle of a body, E13: how far what it touches has moved along it, as far as friction holds.
+/// A contact of two is kept by the particle of the lower slot, or by the one that is awake.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Slips {
+    /// Slot of the other particle; [`Slips::NONE`] where there is no contact.
+    pub with: [u32; HELD_CONTACTS],
+    /// Slip (m) of the other particle relative to this one.
+    pub slip: [[f32; 3]; HELD_CONTACTS],
+}
+
+impl Slips {
+    /// Stands for no contact.
+    pub const NONE: u32 = u32::MAX;
+
+    /// The slip of the contact with a slot (m).
+    #[inline(always)]
+    pub fn of(&self, slot: u32) -> Option<[f32; 3]> {
+        (0..HELD_CONTACTS).find(|&k| self.with[k] == slot).map(|k| self.slip[k])
+    }
+
+    /// Whether there is no contact.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.with[0] == Self::NONE
+    }
+}
+
+impl Default for Slips {
+    fn default() -> Self {
+        Self { with: [Self::NONE; HELD_CONTACTS], slip: [[0.0; 3]; HELD_CONTACTS] }
+    }
 }
 
 /// All particles. Arrays are indexed alike; `segment` tells which range belongs to a kind.
@@ -258,8 +295,8 @@ pub struct Bodies {
     pub normal: Vec<[f32; 3]>,
     /// The same in world axes. Written by drift; rigid slots only, static ones are constant.
     pub facing: Vec<[f32; 3]>,
-    /// Tangential slip of each slot (m), E13. Written by bodies.
-    pub slip: Vec<[f32; 3]>,
+    /// Slips of the contacts of each rigid slot, E13; empty where no body rubs. Written by bodies.
+    pub slips: Vec<Slips>,
     /// Impulse on bodies by joints to what forces do not move, in this step (N s). Written by drift and kick.
     pub joint_impulse: DVec3,
     /// Force on bodies by springs to what forces do not move (N). Written by bodies.

@@ -106,6 +106,91 @@ fn a_ball_of_one_particle_skids_until_it_rolls() {
     }
 }
 
+/// Three discs, two on the floor and one above between them.
+fn pyramid(mu: f64) -> World {
+    let disc = |x: f64, z: f64| {
+        format!(
+            "[[rigid]]\nshape = {{ points = [[0, 0, 0]] }}\nmass = 0.1\nposition = [{x}, 0, {z}]\nstiffness = 1e5\nfriction = {mu}\n"
+        )
+    };
+    world(&format!(
+        "[world]\ndimensions = 2\n[domain]\nmin = [-0.2, 0, 0]\nmax = [0.2, 0, 0.2]\nwalls = [\"open\", \"open\", \"solid\"]\n\
+         [resolution]\nspacing = 0.02\n[solver]\nsleep = 0\n{}{}{}",
+        disc(-0.01001, 0.01),
+        disc(0.01001, 0.01),
+        disc(0.0, 0.0273)
+    ))
+}
+
+#[test]
+fn a_particle_holds_contacts_that_slip_in_different_directions() {
+    // each disc below is held by two contacts that turn it opposite ways. Balance of moments: both bear the same friction; of
+    // forces: it is tan 15 degrees = 0.268 of the normal force above, where that is least
+    for (mu, stands) in [(0.3, true), (0.25, false)] {
+        let mut w = pyramid(mu);
+        w.advance(0.4, |_, r| r.trouble.is_none());
+        let z = w.state().bodies.body[2].x.z;
+        w.advance(0.7, |_, r| r.trouble.is_none());
+        let b = &w.state().bodies.body;
+        println!("mu {mu}: top at {:.6}, creep {:.1e} m/s", b[2].x.z, (z - b[2].x.z) / 0.3);
+        assert_eq!(b[2].x.z > 0.02, stands, "{}", b[2].x.z);
+        if !stands {
+            continue;
+        }
+        assert!((b[2].x.z - z).abs() / 0.3 < 1e-6, "{z} {}", b[2].x.z);
+        // the disc above leans on those below with f = m g / 2 tan 15 degrees of friction, in opposite directions
+        let k_t = 2.0 / 7.0 * 1e5;
+        let friction = 0.1 * G / 2.0 * 15f64.to_radians().tan();
+        for (slot, side) in [(0, 1.0), (1, -1.0)] {
+            let slip = w.state().bodies.slips[slot].of(2).unwrap().map(|s| f64::from(s) * k_t);
+            assert!((slip[0].hypot(slip[2]) / friction - 1.0).abs() < 0.01, "{slip:?} {friction}");
+            assert!(side * slip[0] > 0.0);
+        }
+    }
+}
+
+#[test]
+fn a_slip_turns_with_its_contact() {
+    // two balls in contact that turn as one: the slip turns with them and keeps its length. Here by small steps to 90 degrees, about
+    // an axis that is neither the normal nor across it
+    let axis = glam::Vec3::new(0.6, 0.0, 0.8);
+    let (n, slip) = (glam::Vec3::X, glam::Vec3::new(0.0, 2e-5, -1e-5));
+    let (steps, quarter) = (2000, std::f32::consts::FRAC_PI_2);
+    let step = quarter / steps as f32;
+    let mut carried = slip;
+    for k in 0..steps {
+        let now = glam::Quat::from_axis_angle(axis, step * (k + 1) as f32) * n;
+        let s = jetsam::laws::contact::slip_carried(carried.to_array(), now.to_array(), step * axis.dot(now));
+        carried = glam::Vec3::new(s.x, s.y, s.z);
+    }
+    let expected = glam::Quat::from_axis_angle(axis, quarter) * slip;
+    println!("{carried} {expected}");
+    assert!((carried - expected).length() < 2e-3 * slip.length(), "{carried} {expected}");
+    assert!((carried.length() / slip.length() - 1.0).abs() < 1e-4);
+}
+
+#[test]
+fn slips_outlive_other_constants_and_another_body() {
+    // a block sticks to a slope; another body comes: the block stays where it is
+    let text = |more: &str| {
+        format!(
+            "[world]\ngravity = [4.905, 0, -8.4957]\n[domain]\nmin = [-0.2, -0.2, 0]\nmax = [1.0, 0.2, 0.4]\n\
+             walls = [\"open\", \"open\", \"solid\"]\n[resolution]\nspacing = 0.02\n[solver]\nsleep = 0\n{more}\
+             [[rigid]]\nname = \"block\"\nshape = {{ {BLOCK} }}\ndensity = 1000\nposition = [0, 0, 0.04]\nfriction = 0.6\nrestitution = 0.1\n"
+        )
+    };
+    let other =
+        "[[rigid]]\nname = \"other\"\nshape = { points = [[0, 0, 0]] }\nmass = 0.01\nposition = [0.8, 0, 0.3]\n";
+    let mut w = world(&text(""));
+    w.advance(0.4, |_, r| r.trouble.is_none());
+    let x = w.state().bodies.body[0].x.x;
+    w.take_over(common::scene(&text(other)).assemble().unwrap()).map_err(|e| e.0).unwrap();
+    w.advance(0.45, |_, r| r.trouble.is_none());
+    let b = w.state().bodies.body.iter().find(|b| b.name == "block").unwrap();
+    println!("moved by {:.1e} m", b.x.x - x);
+    assert!((b.x.x - x).abs() < 1e-7, "{}", b.x.x - x);
+}
+
 #[test]
 fn the_articles_preset_has_no_friction_and_creeps() {
     // seed law: the full dashpot alone holds a block back: it reaches v = m g sin / (n eta) and never sticks

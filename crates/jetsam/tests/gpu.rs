@@ -13,17 +13,18 @@ use jetsam::gpu::devices;
 use jetsam::integrate::{Advance, bodies::follow};
 use jetsam::scene::Pressure;
 use jetsam::stage::Stage;
-use jetsam::state::{Kind, State};
+use jetsam::state::{Kind, Slips, State};
 use jetsam::world::Grip;
 use jetsam::{Scene, Trouble, World, state_hash};
 use libtest_mimic::{Arguments, Trial, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let tests: [(&str, fn()); 32] = [
+    let tests: [(&str, fn()); 33] = [
         ("stages_agree_in_a_tank_with_bodies", stages_agree_in_a_tank_with_bodies),
         ("stages_agree_with_every_law", stages_agree_with_every_law),
         ("stages_agree_in_two_dimensions", stages_agree_in_two_dimensions),
+        ("stages_agree_in_a_heap", stages_agree_in_a_heap),
         ("a_hundred_steps_agree", a_hundred_steps_agree),
         ("same_bits_from_run_to_run", same_bits_from_run_to_run),
         ("queued_steps_are_steps", queued_steps_are_steps),
@@ -96,6 +97,32 @@ density = 2000
 shape = { box = { min = [0.14, 0.1, 0.225], max = [0.3, 0.26, 0.34] } }
 velocity = [0.2, 0, -0.5]
 friction = 0.3
+"#;
+
+/// Balls and bricks that lie on each other and rub.
+const HEAP: &str = r#"
+[domain]
+min = [0, 0, 0]
+max = [0.3, 0.16, 0.3]
+[resolution]
+spacing = 0.02
+[solver]
+sleep = 0
+[[rigid]]
+name = "ball"
+shape = { points = [[0, 0, 0]] }
+mass = 0.01
+position = [0.02, 0.013, 0.011]
+velocity = [0.3, 0.2, -0.1]
+stiffness = 2000
+copies = { count = 40, grid = { columns = [5, 4], step = [0.0217, 0.0193, 0.0195] } }
+[[rigid]]
+name = "brick"
+shape = { box = { min = [0, 0, 0], max = [0.06, 0.06, 0.04] } }
+density = 1500
+position = [0.15, 0.03, 0.0]
+velocity = [-0.3, 0.1, -0.1]
+copies = { count = 3, grid = { columns = [1, 1], step = [0.05, 0.02, 0.041] } }
 "#;
 
 /// A body held, fluid poured and the hose moved, another gravity: on both backends the same comes of it.
@@ -259,6 +286,16 @@ fn compare(stage: Stage, cpu: &State, gpu: &State, bar: f32) {
                 }
                 assert!((a.torque - b.torque).length() <= bar, "torque: {} and {}", a.torque, b.torque);
             }
+            let slips = cpu.bodies.slips.iter().flat_map(|s| s.slip).map(|s| Vec3::from(s).length());
+            let longest = slips.fold(1e-20, f32::max);
+            for (a, b) in cpu.bodies.slips.iter().zip(&gpu.bodies.slips) {
+                for k in (0..a.with.len()).filter(|&k| a.with[k] != Slips::NONE) {
+                    let theirs = b.of(a.with[k]).unwrap_or_else(|| panic!("no slip is kept for slot {}", a.with[k]));
+                    let apart = (Vec3::from(a.slip[k]) - Vec3::from(theirs)).length();
+                    assert!(apart <= 200.0 * bar * longest, "slips differ by {apart} of {longest}");
+                }
+                assert_eq!(a.with.contains(&Slips::NONE), b.with.contains(&Slips::NONE));
+            }
         }
         Stage::Kick | Stage::Drift => {
             for (a, b) in cpu.bodies.body.iter().zip(&gpu.bodies.body).filter(|(a, _)| !a.is_static()) {
@@ -333,6 +370,10 @@ fn stages_agree_with_every_law() {
 
 fn stages_agree_in_two_dimensions() {
     stages_agree(FLAT, 60);
+}
+
+fn stages_agree_in_a_heap() {
+    stages_agree(HEAP, 150);
 }
 
 fn gpu_world(assembly: Assembly) -> World {

@@ -34,11 +34,11 @@ trait Writer {
 pub struct Outputs(Vec<Box<dyn Writer>>);
 
 impl Outputs {
-    /// Makes the folder and opens what was asked for in it.
+    /// Makes the folder and opens what was asked for in it; of pictures, how they look and who draws them.
     pub fn create(
         folder: &Path,
         save: &[Save],
-        pictures: &PictureArgs,
+        pictures: (&PictureArgs, pictures::Artist),
         scene: &Scene,
         world: &World,
     ) -> miette::Result<Self> {
@@ -54,7 +54,7 @@ impl Outputs {
                 all.push(Box::new(flocks_csv::FlocksCsv::create(folder)?));
             }
         }
-        if [Save::Png, Save::Mp4, Save::Apng].into_iter().any(wants) {
+        if save.iter().any(|kind| kind.is_picture()) {
             all.push(Box::new(pictures::Pictures::create(folder, save, pictures, scene, world)?));
         }
         if wants(Save::Ply) {

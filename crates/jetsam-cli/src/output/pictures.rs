@@ -5,7 +5,7 @@ use super::{Writer, at, frame_path};
 use crate::args::{PictureArgs, Renderer, Save};
 use crate::terminal::say;
 use glam::{DVec3, Vec3};
-use jetsam::gpu::devices;
+use jetsam::gpu::{Gpu, GpuError, devices};
 use jetsam::{FrameStats, Scene, World};
 use jetsam_view::{Animation, Ball, Camera, Frame, Image, Options, Show, Style, color, paint, render};
 use miette::{IntoDiagnostic, miette};
@@ -20,7 +20,6 @@ pub struct Pictures {
     video: Option<Video>,
     animation: Option<(PathBuf, Animation)>,
     painter: Painter,
-    frame: Frame,
 }
 
 impl Pictures {
@@ -28,7 +27,7 @@ impl Pictures {
     pub fn create(
         folder: &Path,
         save: &[Save],
-        pictures: &PictureArgs,
+        (pictures, artist): (&PictureArgs, Artist),
         scene: &Scene,
         world: &World,
     ) -> miette::Result<Self> {
@@ -44,20 +43,19 @@ impl Pictures {
             let opened = Animation::create(&path, width, height, rate).map_err(at(&path))?;
             animation = Some((path, opened));
         }
+        let show = Show::new(scene, world, width as f32 / height as f32);
         Ok(Self {
             folder: wants(Save::Png).then(|| folder.into()),
             video: video.transpose()?,
             animation,
-            painter: Painter::new(pictures, scene, world)?,
-            frame: Frame::default(),
+            painter: Painter::new(artist, show, pictures)?,
         })
     }
 }
 
 impl Writer for Pictures {
     fn write(&mut self, world: &World, stats: &FrameStats) -> miette::Result<()> {
-        self.frame.take(world);
-        let image = self.painter.paint(&self.frame)?;
+        let image = self.painter.paint(world)?;
         if let Some(folder) = &self.folder {
             image.save_png(frame_path(folder, stats.frame, "png")).into_diagnostic()?;
         }
@@ -75,69 +73,113 @@ impl Writer for Pictures {
     }
 }
 
-/// Who draws.
+/// Who draws the pictures of a run. Chosen before the world is built: a simulation on a GPU then runs on the device that draws, and its
+/// particles are drawn where they are.
+pub struct Artist {
+    gpu: Option<Gpu>,
+    style: Style,
+}
+
+impl Artist {
+    /// Software adapters draw balls more slowly than the processor does: they are taken only when asked for, or for what the
+    /// processor cannot draw.
+    ///
+    /// # Errors
+    /// Only a GPU can draw what is asked for, and there is none, or it may not; a sprite that cannot be read.
+    pub fn of(save: &[Save], pictures: &PictureArgs) -> miette::Result<Self> {
+        let style = pictures.style.style()?;
+        let special = style != Style::default();
+        let any = save.iter().any(|kind| kind.is_picture());
+        let on_gpu = match pictures.renderer {
+            Renderer::Gpu => any,
+            Renderer::Auto => any && (special || devices().iter().any(|d| d.is_hardware())),
+            Renderer::Cpu if special => {
+                return Err(miette!(
+                    help = "leave out --renderer cpu, or the options of pictures but --size",
+                    "the processor draws fluid as balls coloured by speed, and nothing else"
+                ));
+            }
+            Renderer::Cpu => false,
+        };
+        let gpu = match on_gpu.then(open) {
+            Some(Err(problem)) if pictures.renderer == Renderer::Auto && !special => {
+                say(&format!("warning: pictures are drawn by the processor: {problem}"));
+                None
+            }
+            opened => opened.transpose()?,
+        };
+        Ok(Self { gpu, style })
+    }
+
+    /// The device that draws.
+    pub fn gpu(&self) -> Option<&Gpu> {
+        self.gpu.as_ref()
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn open() -> Result<Gpu, GpuError> {
+    Gpu::open(false)
+}
+
+#[cfg(not(feature = "gpu"))]
+fn open() -> Result<Gpu, GpuError> {
+    Err(GpuError::NotBuilt)
+}
+
+/// Draws moments of a world.
 enum Painter {
     Cpu {
         show: Box<Show>,
         size: [usize; 2],
+        style: Style,
+        legend: bool,
+        frame: Frame,
     },
     #[cfg(feature = "gpu")]
     Gpu {
         studio: Box<jetsam_view::gpu::Studio>,
         style: Style,
         legend: bool,
+        frame: Frame,
+        curves: jetsam_view::Curves,
     },
 }
 
 impl Painter {
-    /// Software adapters draw balls more slowly than the processor does: they are taken only when asked for, or for what the
-    /// processor cannot draw.
-    fn new(pictures: &PictureArgs, scene: &Scene, world: &World) -> miette::Result<Self> {
-        let [width, height] = pictures.size;
-        let show = Show::new(scene, world, width as f32 / height as f32);
-        let style = pictures.style.style();
-        let special = style != Style::default();
-        let on_gpu = match pictures.renderer {
-            Renderer::Gpu => true,
-            Renderer::Auto => special || devices().iter().any(|d| d.is_hardware()),
-            Renderer::Cpu => false,
-        };
-        if on_gpu {
-            match Self::gpu(show.clone(), style, pictures) {
-                Err(problem) if pictures.renderer == Renderer::Auto && !special => {
-                    say(&format!("warning: pictures are drawn by the processor: {problem}"));
-                }
-                done => return done,
-            }
-        } else if special {
-            return Err(miette!(
-                help = "leave out --renderer cpu, or the options of pictures but --size",
-                "the processor draws fluid as balls coloured by speed, and nothing else"
-            ));
-        }
-        Ok(Self::Cpu { show: show.into(), size: pictures.size })
-    }
-
-    #[cfg(feature = "gpu")]
-    fn gpu(show: Show, style: Style, pictures: &PictureArgs) -> miette::Result<Self> {
-        use jetsam_view::gpu::Studio;
-        let [width, height] = pictures.size;
-        let gpu = jetsam::gpu::Gpu::open(false)?;
-        let studio = Studio::new(gpu, show, width as u32, height as u32)?.into();
-        Ok(Self::Gpu { studio, style, legend: pictures.legend })
-    }
-
-    #[cfg(not(feature = "gpu"))]
-    fn gpu(_: Show, _: Style, _: &PictureArgs) -> miette::Result<Self> {
-        Err(jetsam::gpu::GpuError::NotBuilt.into())
-    }
-
-    fn paint(&mut self, frame: &Frame) -> miette::Result<Image> {
-        match self {
-            Self::Cpu { show, size: [width, height] } => Ok(paint(show, frame, *width, *height)),
+    fn new(artist: Artist, show: Show, pictures: &PictureArgs) -> miette::Result<Self> {
+        let (size, frame, style, legend) = (pictures.size, Frame::default(), artist.style, pictures.legend);
+        match artist.gpu {
             #[cfg(feature = "gpu")]
-            Self::Gpu { studio, style, legend: wanted } => {
-                let mut image = studio.picture(frame, style, &[])?;
+            Some(gpu) => {
+                let [width, height] = size.map(|s| s as u32);
+                let studio = jetsam_view::gpu::Studio::new(gpu, show, width, height)?.into();
+                Ok(Self::Gpu { studio, style, legend, frame, curves: Default::default() })
+            }
+            _ => Ok(Self::Cpu { show: show.into(), size, style, legend, frame }),
+        }
+    }
+
+    fn paint(&mut self, world: &World) -> miette::Result<Image> {
+        match self {
+            Self::Cpu { show, size: [width, height], style, legend: wanted, frame } => {
+                frame.take(world);
+                let mut image = paint(show, frame, *width, *height);
+                if *wanted {
+                    jetsam_view::legend(&mut image, show, style);
+                }
+                Ok(image)
+            }
+            #[cfg(feature = "gpu")]
+            Self::Gpu { studio, style, legend: wanted, frame, curves } => {
+                if style.at_home() {
+                    frame.take(world)
+                } else {
+                    frame.borrow(world)
+                }
+                curves.note(frame, style);
+                let lines = curves.lines(studio.show(), frame, style);
+                let mut image = studio.picture(frame, style, &lines)?;
                 if *wanted {
                     jetsam_view::legend(&mut image, studio.show(), style);
                 }

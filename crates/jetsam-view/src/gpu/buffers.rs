@@ -1,6 +1,7 @@
 //! What is drawn, in GPU memory: particles in the simulation's own layout, meshes, poses, agents, lines.
 
 use crate::show::{Form, Show};
+use crate::sprite::Sprite;
 use crate::style::Bodies;
 use crate::{Facet, Frame, Line};
 use bytemuck::{Pod, Zeroable};
@@ -131,6 +132,33 @@ pub fn flocks(show: &Show) -> (Vec<[f32; 4]>, Vec<[u32; 2]>) {
     let looks = show.flocks.iter().map(|f| [f.color[0], f.color[1], f.color[2], f.length]).collect();
     let tags = show.flocks.iter().enumerate().flat_map(|(k, f)| f.range.clone().map(move |i| [i as u32, k as u32]));
     (looks, tags.collect())
+}
+
+/// A sprite as a texture, with all its levels.
+pub fn sprite(device: &wgpu::Device, queue: &wgpu::Queue, sprite: &Sprite) -> wgpu::TextureView {
+    let levels = sprite.levels();
+    let extent = |level: &crate::Image| wgpu::Extent3d {
+        width: level.width as u32,
+        height: level.height as u32,
+        depth_or_array_layers: 1,
+    };
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("sprite"),
+        size: extent(&levels[0]),
+        mip_level_count: levels.len() as u32,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    for (k, level) in (0..).zip(&levels) {
+        let to = wgpu::TexelCopyTextureInfo { mip_level: k, ..texture.as_image_copy() };
+        let bytes_per_row = Some(4 * level.width as u32);
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: None };
+        queue.write_texture(to, &level.rgba, layout, extent(level));
+    }
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 /// Poses of all bodies.

@@ -11,19 +11,24 @@
 //! 6. samples averaged to pixels, encoded as sRGB.
 
 mod buffers;
+mod clock;
 mod pipelines;
 mod studio;
 mod targets;
 mod uniforms;
 
+pub use clock::Times;
 /// Particles as the GPU reads them: a simulation on the same device hands over its own buffers.
 pub use jetsam::backend::OnDevice as Particles;
+pub use pipelines::Pipelines;
 pub use studio::Studio;
 
+use crate::sprite::Sprite;
 use crate::style::{Fluid, STEREO, Smoothing, Style};
 use crate::{Camera, Frame, Line, Show};
 use buffers::{Growing, Solid, Stroke};
-use pipelines::{Layouts, Pipelines};
+use clock::Clock;
+use pipelines::Pipe;
 use targets::{Targets, VEIL};
 use uniforms::{LookUniform, ViewUniform, light};
 use wgpu::BufferUsages as Usage;
@@ -43,7 +48,6 @@ pub struct Place<'a> {
 pub struct Renderer {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    layouts: Layouts,
     pipelines: Pipelines,
     show: Show,
     targets: Option<Targets>,
@@ -52,6 +56,9 @@ pub struct Renderer {
     veil: wgpu::TextureView,
     compare: wgpu::Sampler,
     filter: wgpu::Sampler,
+    /// The sprite on the device, once one was drawn.
+    sprite: Option<(Sprite, wgpu::BindGroup)>,
+    clock: Option<Clock>,
     /// The two eyes and the sun.
     views: [wgpu::Buffer; 3],
     look: wgpu::Buffer,
@@ -74,11 +81,8 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// A renderer for a scene; pictures have the format `target`, whose values are written as sRGB by the renderer itself: choose
-    /// one without `Srgb` in its name.
-    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, target: wgpu::TextureFormat, show: Show) -> Self {
-        let layouts = Layouts::new(device);
-        let pipelines = Pipelines::new(device, &layouts, target);
+    /// A renderer for a scene on the device of the pipelines.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, pipelines: Pipelines, show: Show) -> Self {
         let uniform = |label, size| {
             let usage = Usage::UNIFORM | Usage::COPY_DST;
             device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
@@ -86,12 +90,13 @@ impl Renderer {
         let ways = [[1i32, 0, 0, 0], [0, 1, 0, 0]].map(|along| {
             let buffer = uniform("way", 16);
             queue.write_buffer(&buffer, 0, bytemuck::bytes_of(&along));
-            group(device, &layouts.way, &[(0, buffer.as_entire_binding())])
+            group(device, &pipelines.layouts.way, &[(0, buffer.as_entire_binding())])
         });
         let sampler = |compare, filter| {
             device.create_sampler(&wgpu::SamplerDescriptor {
                 mag_filter: filter,
                 min_filter: filter,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
                 compare,
                 ..Default::default()
             })
@@ -105,6 +110,8 @@ impl Renderer {
             veil: targets::texture(device, "veil", [VEIL; 2], targets::WATER),
             compare: sampler(Some(wgpu::CompareFunction::Greater), wgpu::FilterMode::Linear),
             filter: sampler(None, wgpu::FilterMode::Linear),
+            sprite: None,
+            clock: None,
             views: [(); 3].map(|()| uniform("view", size_of::<ViewUniform>() as u64)),
             look: uniform("look", size_of::<LookUniform>() as u64),
             ways,
@@ -124,7 +131,6 @@ impl Renderer {
             show: show.clone(),
             device: device.clone(),
             queue: queue.clone(),
-            layouts,
             pipelines,
         };
         renderer.set_show(show);
@@ -203,6 +209,7 @@ impl Renderer {
         let aside = 0.5 * STEREO * style.stereo * camera.eye.distance(camera.target);
         let points = if style.fluid == Fluid::Points { 1.5 * style.samples as f32 } else { 0.0 };
         let eyes: &[f32] = if stereo { &[-1.0, 1.0] } else { &[0.0] };
+        self.clock.iter().for_each(Clock::begin);
         self.sun_pass(encoder, style);
         for (k, side) in eyes.iter().enumerate() {
             let view = ViewUniform::eye(camera, size, side * aside, points);
@@ -211,6 +218,7 @@ impl Renderer {
             self.eye_passes(encoder, k, style);
             self.resolve_pass(encoder, Place { rect, clear: place.clear && k == 0, ..place }, k, style);
         }
+        self.clock.iter().for_each(|clock| clock.end(encoder));
         self.last = (!stereo).then(|| (place.rect, style.clone()));
     }
 
@@ -219,6 +227,17 @@ impl Renderer {
         let Some((rect, style)) = self.last.as_ref().filter(|(rect, _)| *rect == place.rect) else { return false };
         self.resolve_pass(encoder, Place { rect: *rect, ..place }, 0, style);
         true
+    }
+
+    /// From now on passes are timed, where the device has a clock. Whether it has.
+    pub fn time_passes(&mut self) -> bool {
+        self.clock = self.clock.take().or_else(|| Clock::new(&self.device, &self.queue));
+        self.clock.is_some()
+    }
+
+    /// How long the last picture took, once it was submitted and if passes are timed; waits for it.
+    pub fn times(&self) -> Option<Times> {
+        self.clock.as_ref()?.read(&self.device)
     }
 
     /// Writes what all passes of a picture read.
@@ -233,6 +252,11 @@ impl Renderer {
         queue.write_buffer(&self.look, 0, bytemuck::bytes_of(&look));
         let sun = ViewUniform::sun(self.show.bounds[0], self.show.bounds[1], light(), style.shadow_size);
         queue.write_buffer(&self.views[2], 0, bytemuck::bytes_of(&sun));
+        if style.fluid == Fluid::Sprites && self.sprite.as_ref().is_none_or(|(known, _)| *known != style.sprite) {
+            let texels = buffers::sprite(device, queue, &style.sprite);
+            let entries = [(0, texture(&texels)), (1, wgpu::BindingResource::Sampler(&self.filter))];
+            self.sprite = Some((style.sprite.clone(), group(device, &self.pipelines.layouts.sprite, &entries)));
+        }
         let edges: &[Line] = if style.edges { &self.show.edges } else { &[] };
         let width = 1.2 * style.samples as f32;
         let mut strokes: Vec<Stroke> = edges.iter().map(|l| Stroke::new(l, width)).collect();
@@ -243,25 +267,25 @@ impl Renderer {
 
     fn view_group(&self, k: usize) -> wgpu::BindGroup {
         let entries = [(0, self.views[k].as_entire_binding()), (1, self.look.as_entire_binding())];
-        group(&self.device, &self.layouts.view, &entries)
+        group(&self.device, &self.pipelines.layouts.view, &entries)
     }
 
     fn particle_group(&self) -> wgpu::BindGroup {
         let p = &self.particles;
         let parts = [&p.record, &p.push, &p.tag, &self.owners.buffer];
         let entries: Vec<_> = (0..).zip(parts.map(|b| b.as_entire_binding())).collect();
-        group(&self.device, &self.layouts.particles, &entries)
+        group(&self.device, &self.pipelines.layouts.particles, &entries)
     }
 
     fn agent_group(&self) -> wgpu::BindGroup {
         let [records, tags, looks] = &self.agents;
         let parts = [&records.buffer, &records.buffer, &tags.buffer, &looks.buffer];
         let entries: Vec<_> = (0..).zip(parts.map(|b| b.as_entire_binding())).collect();
-        group(&self.device, &self.layouts.particles, &entries)
+        group(&self.device, &self.pipelines.layouts.particles, &entries)
     }
 
     fn pose_group(&self) -> wgpu::BindGroup {
-        group(&self.device, &self.layouts.poses, &[(0, self.poses.buffer.as_entire_binding())])
+        group(&self.device, &self.pipelines.layouts.poses, &[(0, self.poses.buffer.as_entire_binding())])
     }
 
     /// The particles of a kind as instances.
@@ -281,24 +305,34 @@ impl Renderer {
     }
 
     /// Balls of the kinds that are drawn so.
-    fn draw_balls(&self, pass: &mut wgpu::RenderPass, style: &Style) {
-        if matches!(style.fluid, Fluid::Balls | Fluid::Points) {
-            pass.draw(0..4, self.range(0));
-        }
-        if self.any_balls(style, false) {
-            pass.draw(0..4, self.range(1));
-        }
-        if self.any_balls(style, true) {
-            // bodies that follow a script stand with the rigid ones
-            pass.draw(0..4, self.range(2));
+    fn draw_balls(&self, pass: &mut wgpu::RenderPass, pipe: Pipe, style: &Style) {
+        // bodies that follow a script stand with the rigid ones
+        let drawn = [
+            matches!(style.fluid, Fluid::Balls | Fluid::Points),
+            self.any_balls(style, false),
+            self.any_balls(style, true),
+        ];
+        for kind in (0..3).filter(|&kind| drawn[kind]) {
+            pass.set_pipeline(self.pipelines.get(pipe));
+            pass.draw(0..4, self.range(kind));
         }
     }
 
-    fn draw_meshes(&self, pass: &mut wgpu::RenderPass, style: &Style) {
+    /// The fluid as sprites. The third group is theirs then.
+    fn draw_sprites(&self, pass: &mut wgpu::RenderPass, pipe: Pipe, style: &Style) {
+        if let (Fluid::Sprites, Some((_, texels))) = (style.fluid, &self.sprite) {
+            pass.set_pipeline(self.pipelines.get(pipe));
+            pass.set_bind_group(2, texels, &[]);
+            pass.draw(0..4, self.range(0));
+        }
+    }
+
+    fn draw_meshes(&self, pass: &mut wgpu::RenderPass, pipe: Pipe, style: &Style) {
         if style.bodies == crate::style::Bodies::Particles {
             return;
         }
         for solid in self.solids.iter().filter(|s| !s.is_empty()) {
+            pass.set_pipeline(self.pipelines.get(pipe));
             pass.set_vertex_buffer(0, solid.vertices.slice(..));
             pass.set_vertex_buffer(1, self.order.buffer.slice(..));
             pass.draw(0..solid.count, solid.instances.clone());
@@ -309,27 +343,26 @@ impl Renderer {
     fn sun_pass(&self, encoder: &mut wgpu::CommandEncoder, style: &Style) {
         let (view, particles) = (self.view_group(2), self.particle_group());
         {
-            let mut pass = begin(encoder, "sun", &[], Some((&self.shadow.0, 0.0)));
+            let mut pass = self.begin(encoder, "sun", &[], Some((&self.shadow.0, 0.0)));
             if style.shadows {
                 pass.set_bind_group(0, &view, &[]);
                 pass.set_bind_group(1, &particles, &[]);
-                pass.set_pipeline(&self.pipelines.shadow_ball);
-                self.draw_balls(&mut pass, style);
+                self.draw_balls(&mut pass, Pipe::ShadowBall, style);
+                self.draw_sprites(&mut pass, Pipe::ShadowSprite, style);
                 pass.set_bind_group(2, &self.pose_group(), &[]);
-                pass.set_pipeline(&self.pipelines.shadow_mesh);
-                self.draw_meshes(&mut pass, style);
+                self.draw_meshes(&mut pass, Pipe::ShadowMesh, style);
                 if self.agent_count > 0 {
                     pass.set_bind_group(1, &self.agent_group(), &[]);
-                    pass.set_pipeline(&self.pipelines.shadow_dart);
+                    pass.set_pipeline(self.pipelines.get(Pipe::ShadowDart));
                     pass.draw(0..24, 0..self.agent_count);
                 }
             }
         }
-        let mut pass = begin(encoder, "veil", &[(&self.veil, [0.0; 4])], None);
+        let mut pass = self.begin(encoder, "veil", &[(&self.veil, [0.0; 4])], None);
         if style.shadows && style.fluid == Fluid::Surface {
             pass.set_bind_group(0, &view, &[]);
             pass.set_bind_group(1, &particles, &[]);
-            pass.set_pipeline(&self.pipelines.thickness);
+            pass.set_pipeline(self.pipelines.get(Pipe::Thickness));
             pass.draw(0..4, self.range(0));
         }
     }
@@ -340,34 +373,35 @@ impl Renderer {
         let (view, particles) = (self.view_group(eye), self.particle_group());
         {
             let colors = [(&t.albedo, [0.0; 4]), (&t.normal, [0.0; 4])];
-            let mut pass = begin(encoder, "seen", &colors, Some((&t.depth, 0.0)));
+            let mut pass = self.begin(encoder, "seen", &colors, Some((&t.depth, 0.0)));
             pass.set_bind_group(0, &view, &[]);
             pass.set_bind_group(1, &particles, &[]);
-            pass.set_bind_group(2, &self.pose_group(), &[]);
+            let poses = self.pose_group();
+            pass.set_bind_group(2, &poses, &[]);
             // large things first: they hide much
-            pass.set_pipeline(&self.pipelines.mesh);
-            self.draw_meshes(&mut pass, style);
-            pass.set_pipeline(&self.pipelines.ball);
-            self.draw_balls(&mut pass, style);
+            self.draw_meshes(&mut pass, Pipe::Mesh, style);
+            self.draw_balls(&mut pass, Pipe::Ball, style);
+            self.draw_sprites(&mut pass, Pipe::Sprite, style);
+            pass.set_bind_group(2, &poses, &[]);
             if style.arrows > 0.0 {
-                pass.set_pipeline(&self.pipelines.arrow);
+                pass.set_pipeline(self.pipelines.get(Pipe::Arrow));
                 pass.draw(0..9, self.range(0));
                 pass.draw(0..9, self.range(1));
             }
             if self.stroke_count > 0 {
-                pass.set_pipeline(&self.pipelines.line);
+                pass.set_pipeline(self.pipelines.get(Pipe::Line));
                 pass.set_vertex_buffer(0, self.strokes.buffer.slice(..));
                 pass.draw(0..4, 0..self.stroke_count);
             }
             if self.agent_count > 0 {
                 pass.set_bind_group(1, &self.agent_group(), &[]);
-                pass.set_pipeline(&self.pipelines.dart);
+                pass.set_pipeline(self.pipelines.get(Pipe::Dart));
                 pass.draw(0..24, 0..self.agent_count);
             }
         }
         let shade = group(
             &self.device,
-            &self.layouts.shade,
+            &self.pipelines.layouts.shade,
             &[
                 (0, texture(&t.albedo)),
                 (1, texture(&t.normal)),
@@ -379,7 +413,7 @@ impl Renderer {
                 (7, wgpu::BindingResource::Sampler(&self.filter)),
             ],
         );
-        self.picture(encoder, "shade", &self.pipelines.shade, &[&view, &shade], &t.scene);
+        self.picture(encoder, "shade", self.pipelines.get(Pipe::Shade), &[&view, &shade], &t.scene);
         if style.fluid == Fluid::Surface {
             self.water_passes(encoder, t, &view, &particles, style);
         }
@@ -395,22 +429,22 @@ impl Renderer {
         style: &Style,
     ) {
         {
-            let mut pass = begin(encoder, "fluid depth", &[], Some((&t.fluid_depth, 0.0)));
+            let mut pass = self.begin(encoder, "fluid depth", &[], Some((&t.fluid_depth, 0.0)));
             pass.set_bind_group(0, view, &[]);
             pass.set_bind_group(1, particles, &[]);
-            pass.set_pipeline(&self.pipelines.drop);
+            pass.set_pipeline(self.pipelines.get(Pipe::Drop));
             pass.draw(0..4, self.range(0));
         }
         {
-            let mut pass = begin(encoder, "thickness", &[(&t.thickness, [0.0; 4])], None);
+            let mut pass = self.begin(encoder, "thickness", &[(&t.thickness, [0.0; 4])], None);
             pass.set_bind_group(0, view, &[]);
             pass.set_bind_group(1, particles, &[]);
-            pass.set_pipeline(&self.pipelines.thickness);
+            pass.set_pipeline(self.pipelines.get(Pipe::Thickness));
             pass.draw(0..4, self.range(0));
         }
-        let linear = group(&self.device, &self.layouts.linear, &[(0, texture(&t.fluid_depth))]);
-        self.picture(encoder, "linear", &self.pipelines.linear, &[view, &linear], &t.field[0]);
-        let fields = [0, 1].map(|k| group(&self.device, &self.layouts.field, &[(1, texture(&t.field[k]))]));
+        let linear = group(&self.device, &self.pipelines.layouts.linear, &[(0, texture(&t.fluid_depth))]);
+        self.picture(encoder, "linear", self.pipelines.get(Pipe::Linear), &[view, &linear], &t.field[0]);
+        let fields = [0, 1].map(|k| group(&self.device, &self.pipelines.layouts.field, &[(1, texture(&t.field[k]))]));
         let mut now = 0;
         let mut step = |pipeline: &wgpu::RenderPipeline, way: Option<&wgpu::BindGroup>| {
             let mut groups = vec![view, &fields[now]];
@@ -422,20 +456,20 @@ impl Renderer {
             Smoothing::None => {}
             Smoothing::NarrowRange | Smoothing::Bilateral => {
                 let narrow = style.smoothing == Smoothing::NarrowRange;
-                let pipeline = if narrow { &self.pipelines.narrow } else { &self.pipelines.bilateral };
+                let pipeline = self.pipelines.get(if narrow { Pipe::Narrow } else { Pipe::Bilateral });
                 for _ in 0..style.passes {
                     self.ways.iter().for_each(|way| step(pipeline, Some(way)));
                 }
                 if narrow {
-                    step(&self.pipelines.tidy, None);
+                    step(self.pipelines.get(Pipe::Tidy), None);
                 }
             }
             // many small steps
-            Smoothing::CurvatureFlow => (0..20 * style.passes).for_each(|_| step(&self.pipelines.flow, None)),
+            Smoothing::CurvatureFlow => (0..20 * style.passes).for_each(|_| step(self.pipelines.get(Pipe::Flow), None)),
         }
         let compose = group(
             &self.device,
-            &self.layouts.compose,
+            &self.pipelines.layouts.compose,
             &[
                 (0, texture(&t.scene)),
                 (1, texture(&t.field[now])),
@@ -443,19 +477,19 @@ impl Renderer {
                 (3, wgpu::BindingResource::Sampler(&self.filter)),
             ],
         );
-        self.picture(encoder, "compose", &self.pipelines.compose, &[view, &compose], &t.whole);
+        self.picture(encoder, "compose", self.pipelines.get(Pipe::Compose), &[view, &compose], &t.whole);
     }
 
     /// A pass over all pixels.
     fn picture(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        label: &str,
+        label: &'static str,
         pipeline: &wgpu::RenderPipeline,
         groups: &[&wgpu::BindGroup],
         to: &wgpu::TextureView,
     ) {
-        let mut pass = begin(encoder, label, &[(to, [0.0; 4])], None);
+        let mut pass = self.begin(encoder, label, &[(to, [0.0; 4])], None);
         pass.set_pipeline(pipeline);
         for (k, group) in (0..).zip(groups) {
             pass.set_bind_group(k, *group, &[]);
@@ -471,7 +505,7 @@ impl Renderer {
         self.queue.write_buffer(&self.resolve[eye], 0, bytemuck::bytes_of(&to));
         let whole = if style.fluid == Fluid::Surface { &t.whole } else { &t.scene };
         let entries = [(0, texture(whole)), (4, self.resolve[eye].as_entire_binding())];
-        let resolve = group(&self.device, &self.layouts.resolve, &entries);
+        let resolve = group(&self.device, &self.pipelines.layouts.resolve, &entries);
         let load = if place.clear { wgpu::LoadOp::Clear(wgpu::Color::BLACK) } else { wgpu::LoadOp::Load };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("resolve"),
@@ -481,14 +515,45 @@ impl Renderer {
                 resolve_target: None,
                 ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
             })],
+            timestamp_writes: self.clock.as_ref().and_then(|clock| clock.pass("resolve")),
             ..Default::default()
         });
         pass.set_viewport(x as f32, y as f32, width as f32, height as f32, 0.0, 1.0);
         pass.set_scissor_rect(x, y, width, height);
-        pass.set_pipeline(&self.pipelines.resolve);
+        pass.set_pipeline(self.pipelines.get(Pipe::Resolve));
         pass.set_bind_group(0, &self.view_group(eye), &[]);
         pass.set_bind_group(1, &resolve, &[]);
         pass.draw(0..3, 0..1);
+    }
+
+    /// Begins a pass that clears what it draws to.
+    fn begin<'e>(
+        &self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        label: &'static str,
+        colors: &[(&wgpu::TextureView, [f64; 4])],
+        depth: Option<(&wgpu::TextureView, f32)>,
+    ) -> wgpu::RenderPass<'e> {
+        let attached: Vec<_> = colors
+            .iter()
+            .map(|&(view, [r, g, b, a])| {
+                let load = wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a });
+                let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
+                Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
+            })
+            .collect();
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some(label),
+            color_attachments: &attached,
+            depth_stencil_attachment: depth.map(|(view, clear)| wgpu::RenderPassDepthStencilAttachment {
+                view,
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store: wgpu::StoreOp::Store }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: self.clock.as_ref().and_then(|clock| clock.pass(label)),
+            occlusion_query_set: None,
+            multiview_mask: None,
+        })
     }
 }
 
@@ -512,33 +577,4 @@ fn group(
         .map(|(binding, resource)| wgpu::BindGroupEntry { binding: *binding, resource: resource.clone() })
         .collect();
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
-}
-
-/// Begins a pass that clears what it draws to.
-fn begin<'e>(
-    encoder: &'e mut wgpu::CommandEncoder,
-    label: &str,
-    colors: &[(&wgpu::TextureView, [f64; 4])],
-    depth: Option<(&wgpu::TextureView, f32)>,
-) -> wgpu::RenderPass<'e> {
-    let attached: Vec<_> = colors
-        .iter()
-        .map(|&(view, [r, g, b, a])| {
-            let load = wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a });
-            let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
-            Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
-        })
-        .collect();
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some(label),
-        color_attachments: &attached,
-        depth_stencil_attachment: depth.map(|(view, clear)| wgpu::RenderPassDepthStencilAttachment {
-            view,
-            depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store: wgpu::StoreOp::Store }),
-            stencil_ops: None,
-        }),
-        timestamp_writes: None,
-        occlusion_query_set: None,
-        multiview_mask: None,
-    })
 }

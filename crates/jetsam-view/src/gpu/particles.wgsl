@@ -75,6 +75,21 @@ fn ball(@builtin(vertex_index) v: u32, @builtin(instance_index) i: u32) -> Ball 
     return outline(v, record[2u * i].xyz, r, own.rgb);
 }
 
+// A square that faces the eye, through the centre.
+struct Square {
+    @builtin(position) at: vec4<f32>,
+    // place in the sprite
+    @location(0) uv: vec2<f32>,
+    @location(1) @interpolate(flat) color: vec3<f32>,
+}
+
+@vertex
+fn square(@builtin(vertex_index) v: u32, @builtin(instance_index) i: u32) -> Square {
+    let corner = vec2(f32(v & 1u) * 2.0 - 1.0, f32(v >> 1u) * 2.0 - 1.0);
+    let c = local(view, record[2u * i].xyz) + vec3(corner * look.radius.x, 0.0);
+    return Square(clip(view, c), vec2(0.5, -0.5) * corner + 0.5, look_of(i).rgb);
+}
+
 // The fluid for its surface.
 @vertex
 fn drop(@builtin(vertex_index) v: u32, @builtin(instance_index) i: u32) -> Ball {
@@ -134,6 +149,31 @@ fn depth_alone(b: Ball) -> @builtin(frag_depth) f32 {
 @fragment
 fn disc(b: Ball) {
     if dot(b.slope, b.slope) > 1.0 {
+        discard;
+    }
+}
+
+@group(2) @binding(0) var sprite: texture_2d<f32>;
+@group(2) @binding(1) var sprite_sampler: sampler;
+
+struct Flat {
+    @location(0) albedo: vec4<f32>,
+    @location(1) normal: vec4<f32>,
+}
+
+// Without light: a sprite brings its own.
+@fragment
+fn textured(s: Square) -> Flat {
+    let texel = textureSample(sprite, sprite_sampler, s.uv);
+    if texel.a < 0.5 {
+        discard;
+    }
+    return Flat(vec4(texel.rgb * s.color, 0.5), vec4(0.5));
+}
+
+@fragment
+fn silhouette(s: Square) {
+    if textureSample(sprite, sprite_sampler, s.uv).a < 0.5 {
         discard;
     }
 }

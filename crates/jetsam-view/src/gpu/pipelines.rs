@@ -1,6 +1,8 @@
-//! The render pipelines, one a shader entry point.
+//! The render pipelines, one a shader entry point. In: a device. Out: pipelines for the passes of `mod.rs`.
 
 use super::targets::{ALBEDO, DEPTH, FIELD, LIGHT, NORMAL, WATER};
+use crate::style::{Fluid, Style};
+use std::sync::OnceLock;
 use wgpu::{BindingType as Type, ShaderStages as Stages};
 
 const COMMON: &str = include_str!("common.wgsl");
@@ -19,6 +21,7 @@ pub struct Layouts {
     pub view: wgpu::BindGroupLayout,
     pub particles: wgpu::BindGroupLayout,
     pub poses: wgpu::BindGroupLayout,
+    pub sprite: wgpu::BindGroupLayout,
     pub shade: wgpu::BindGroupLayout,
     pub linear: wgpu::BindGroupLayout,
     pub field: wgpu::BindGroupLayout,
@@ -27,25 +30,41 @@ pub struct Layouts {
     pub resolve: wgpu::BindGroupLayout,
 }
 
+/// A pipeline, named by what it draws.
+#[derive(Clone, Copy, Debug)]
+pub enum Pipe {
+    Ball,
+    Drop,
+    Thickness,
+    ShadowBall,
+    Sprite,
+    ShadowSprite,
+    Mesh,
+    ShadowMesh,
+    Dart,
+    ShadowDart,
+    Arrow,
+    Line,
+    Shade,
+    Linear,
+    Narrow,
+    Tidy,
+    Bilateral,
+    Flow,
+    Compose,
+    // the last: see `PIPES`
+    Resolve,
+}
+
+const PIPES: usize = Pipe::Resolve as usize + 1;
+
+/// All pipelines, each compiled when it is first asked for: a picture needs a third of them.
 pub struct Pipelines {
-    pub ball: wgpu::RenderPipeline,
-    pub drop: wgpu::RenderPipeline,
-    pub thickness: wgpu::RenderPipeline,
-    pub shadow_ball: wgpu::RenderPipeline,
-    pub mesh: wgpu::RenderPipeline,
-    pub shadow_mesh: wgpu::RenderPipeline,
-    pub dart: wgpu::RenderPipeline,
-    pub shadow_dart: wgpu::RenderPipeline,
-    pub arrow: wgpu::RenderPipeline,
-    pub line: wgpu::RenderPipeline,
-    pub shade: wgpu::RenderPipeline,
-    pub linear: wgpu::RenderPipeline,
-    pub narrow: wgpu::RenderPipeline,
-    pub tidy: wgpu::RenderPipeline,
-    pub bilateral: wgpu::RenderPipeline,
-    pub flow: wgpu::RenderPipeline,
-    pub compose: wgpu::RenderPipeline,
-    pub resolve: wgpu::RenderPipeline,
+    device: wgpu::Device,
+    pub(super) layouts: Layouts,
+    target: wgpu::TextureFormat,
+    modules: [OnceLock<wgpu::ShaderModule>; SHADERS.len()],
+    made: [OnceLock<wgpu::RenderPipeline>; PIPES],
 }
 
 fn layout(device: &wgpu::Device, label: &str, stages: Stages, entries: &[(u32, Type)]) -> wgpu::BindGroupLayout {
@@ -83,6 +102,7 @@ impl Layouts {
             view: make("view", both, &[(0, UNIFORM), (1, UNIFORM)]),
             particles: make("particles", vertex, &[(0, STORAGE), (1, STORAGE), (2, STORAGE), (3, STORAGE)]),
             poses: make("poses", vertex, &[(0, STORAGE)]),
+            sprite: make("sprite", fragment, &[(0, SMOOTH), (1, filtering)]),
             shade: make(
                 "shade",
                 fragment,
@@ -128,28 +148,61 @@ const ADD: wgpu::BlendState = {
 };
 
 impl Pipelines {
-    /// All pipelines; pictures end in the format `target`.
-    pub fn new(device: &wgpu::Device, l: &Layouts, target: wgpu::TextureFormat) -> Self {
-        let modules = SHADERS.map(|(label, text)| {
-            device.create_shader_module(wgpu::ShaderModuleDescriptor {
+    /// For pictures in the format `target`, whose values are written as sRGB by the renderer itself: choose one without `Srgb` in its
+    /// name.
+    pub fn new(device: &wgpu::Device, target: wgpu::TextureFormat) -> Self {
+        let layouts = Layouts::new(device);
+        Self { device: device.clone(), layouts, target, modules: Default::default(), made: Default::default() }
+    }
+
+    /// One of them.
+    pub(super) fn get(&self, pipe: Pipe) -> &wgpu::RenderPipeline {
+        self.made[pipe as usize].get_or_init(|| self.make(pipe))
+    }
+
+    /// Compiles what a picture of a style needs, so that the first one need not wait for it.
+    pub fn prepare(&self, style: &Style) {
+        use Pipe::{Ball, Compose, Drop, Line, Linear, Mesh, Resolve, Shade, ShadowBall, ShadowMesh, Sprite};
+        let fluid: &[Pipe] = match style.fluid {
+            Fluid::Balls | Fluid::Points => &[Ball, ShadowBall],
+            Fluid::Surface => &[Drop, Pipe::Thickness, Linear, Compose],
+            Fluid::Sprites => &[Sprite, Pipe::ShadowSprite],
+            Fluid::Hidden => &[],
+        };
+        [Mesh, ShadowMesh, Line, Shade, Resolve].iter().chain(fluid).for_each(|pipe| {
+            self.get(*pipe);
+        });
+    }
+
+    fn module(&self, index: usize) -> &wgpu::ShaderModule {
+        let (label, text) = SHADERS[index];
+        self.modules[index].get_or_init(|| {
+            self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(label),
                 source: wgpu::ShaderSource::Wgsl(format!("{COMMON}\n{text}").into()),
             })
-        });
-        let make = |recipe: Recipe| build(device, &modules[recipe.module], &recipe);
+        })
+    }
+
+    fn make(&self, pipe: Pipe) -> wgpu::RenderPipeline {
+        let l = &self.layouts;
+        let make = |recipe: Recipe| build(&self.device, self.module(recipe.module), &recipe);
         let surface = [(ALBEDO, None), (NORMAL, None)];
-        let (balls, meshes) = ([&l.view, &l.particles], [&l.view, &l.particles, &l.poses]);
         let mesh_buffers = [
             Some(vertex_buffer(24, wgpu::VertexStepMode::Vertex, &MESH_VERTEX)),
             Some(vertex_buffer(4, wgpu::VertexStepMode::Instance, &MESH_INSTANCE)),
         ];
         let line_buffer = [Some(vertex_buffer(40, wgpu::VertexStepMode::Instance, &LINE))];
         let ball = |vertex, fragment, colors, depth| {
-            let groups = &balls[..];
+            let groups = &[&l.view, &l.particles];
             make(Recipe { module: 0, vertex, fragment, groups, strip: true, colors, depth, buffers: &[] })
         };
+        let sprite = |fragment, colors| {
+            let (vertex, groups) = ("square", &[&l.view, &l.particles, &l.sprite]);
+            make(Recipe { module: 0, vertex, fragment, groups, strip: true, colors, depth: true, buffers: &[] })
+        };
         let solid = |vertex, fragment, colors, strip, buffers| {
-            let groups = &meshes[..];
+            let groups = &[&l.view, &l.particles, &l.poses];
             make(Recipe { module: 1, vertex, fragment, groups, strip, colors, depth: true, buffers })
         };
         let picture = |module, fragment, groups: &[&wgpu::BindGroupLayout], format| {
@@ -157,26 +210,27 @@ impl Pipelines {
             let vertex = "picture";
             make(Recipe { module, vertex, fragment, groups, strip: false, colors, depth: false, buffers: &[] })
         };
-        let water = [(WATER, Some(ADD))];
-        Self {
-            ball: ball("ball", "shown", &surface, true),
-            drop: ball("drop", "depth_alone", &[], true),
-            thickness: ball("share", "thickness", &water, false),
-            shadow_ball: ball("ball", "disc", &[], true),
-            mesh: solid("mesh", "solid", &surface, false, &mesh_buffers),
-            shadow_mesh: solid("mesh", "nothing", &[], false, &mesh_buffers),
-            dart: solid("dart", "solid", &surface, false, &[]),
-            shadow_dart: solid("dart", "nothing", &[], false, &[]),
-            arrow: solid("arrow", "plain", &surface, false, &[]),
-            line: solid("line", "plain", &surface, true, &line_buffer),
-            shade: picture(2, "shade", &[&l.view, &l.shade], LIGHT),
-            linear: picture(3, "linear", &[&l.view, &l.linear], FIELD),
-            narrow: picture(3, "narrow", &[&l.view, &l.field, &l.way], FIELD),
-            tidy: picture(3, "tidy", &[&l.view, &l.field], FIELD),
-            bilateral: picture(3, "bilateral", &[&l.view, &l.field, &l.way], FIELD),
-            flow: picture(3, "flow", &[&l.view, &l.field], FIELD),
-            compose: picture(4, "compose", &[&l.view, &l.compose], LIGHT),
-            resolve: picture(4, "resolve", &[&l.view, &l.resolve], target),
+        match pipe {
+            Pipe::Ball => ball("ball", "shown", &surface, true),
+            Pipe::Drop => ball("drop", "depth_alone", &[], true),
+            Pipe::Thickness => ball("share", "thickness", &[(WATER, Some(ADD))], false),
+            Pipe::ShadowBall => ball("ball", "disc", &[], true),
+            Pipe::Sprite => sprite("textured", &surface),
+            Pipe::ShadowSprite => sprite("silhouette", &[]),
+            Pipe::Mesh => solid("mesh", "solid", &surface, false, &mesh_buffers),
+            Pipe::ShadowMesh => solid("mesh", "nothing", &[], false, &mesh_buffers),
+            Pipe::Dart => solid("dart", "solid", &surface, false, &[]),
+            Pipe::ShadowDart => solid("dart", "nothing", &[], false, &[]),
+            Pipe::Arrow => solid("arrow", "plain", &surface, false, &[]),
+            Pipe::Line => solid("line", "plain", &surface, true, &line_buffer),
+            Pipe::Shade => picture(2, "shade", &[&l.view, &l.shade], LIGHT),
+            Pipe::Linear => picture(3, "linear", &[&l.view, &l.linear], FIELD),
+            Pipe::Narrow => picture(3, "narrow", &[&l.view, &l.field, &l.way], FIELD),
+            Pipe::Tidy => picture(3, "tidy", &[&l.view, &l.field], FIELD),
+            Pipe::Bilateral => picture(3, "bilateral", &[&l.view, &l.field, &l.way], FIELD),
+            Pipe::Flow => picture(3, "flow", &[&l.view, &l.field], FIELD),
+            Pipe::Compose => picture(4, "compose", &[&l.view, &l.compose], LIGHT),
+            Pipe::Resolve => picture(4, "resolve", &[&l.view, &l.resolve], self.target),
         }
     }
 }

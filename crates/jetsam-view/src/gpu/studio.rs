@@ -1,6 +1,6 @@
 //! Pictures without a window: a renderer, a texture to draw to, and the way back to the host.
 
-use super::{Particles, Place, Renderer};
+use super::{Particles, Pipelines, Place, Renderer, Times};
 use crate::{Frame, Image, Line, Show, Style};
 use jetsam::gpu::{Gpu, GpuError};
 
@@ -22,7 +22,7 @@ impl Studio {
     /// A device that refuses, or has too little memory.
     pub fn new(gpu: Gpu, show: Show, width: u32, height: u32) -> Result<Self, GpuError> {
         let (renderer, texture, back) = gpu.attempt(|| {
-            let renderer = Renderer::new(&gpu.device, &gpu.queue, FORMAT, show);
+            let renderer = Renderer::new(&gpu.device, &gpu.queue, Pipelines::new(&gpu.device, FORMAT), show);
             let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("picture"),
                 size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
@@ -69,6 +69,27 @@ impl Studio {
         lines: &[Line],
     ) -> Result<Image, GpuError> {
         self.take(|renderer| renderer.borrow(particles, frame), style, lines)
+    }
+
+    /// How long such a picture takes on the device, which it does not leave; nothing where the device has no clock.
+    ///
+    /// # Errors
+    /// As [`Studio::picture`].
+    pub fn times(&mut self, frame: &Frame, style: &Style, lines: &[Line]) -> Result<Option<Times>, GpuError> {
+        let Self { gpu, renderer, texture, size: [width, height], .. } = self;
+        gpu.attempt(|| {
+            if !renderer.time_passes() {
+                return Ok(None);
+            }
+            renderer.load(frame);
+            let target = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let place = Place { target: &target, rect: [0, 0, *width, *height], clear: true };
+            let camera = renderer.show().camera;
+            renderer.draw(&mut encoder, place, &camera, style, lines);
+            gpu.queue.submit([encoder.finish()]);
+            Ok(renderer.times())
+        })
     }
 
     fn take(&mut self, load: impl FnOnce(&mut Renderer), style: &Style, lines: &[Line]) -> Result<Image, GpuError> {

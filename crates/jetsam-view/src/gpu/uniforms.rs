@@ -2,7 +2,7 @@
 
 use crate::camera::View;
 use crate::paint::{RADIUS, SHEER};
-use crate::style::{Arrows, ColorBy, Fluid, Smoothing, Style};
+use crate::style::{Arrows, ColorBy, Fluid, Lines, Smoothing, Style};
 use crate::{Camera, Show};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -109,6 +109,9 @@ pub fn light() -> Vec3 {
 /// `THIN` of `particles.wgsl` goes with it.
 const BLUR: f32 = 1.1;
 
+/// Radius of a ball in spacings where there are lines between them.
+const SPECK: f32 = 0.07;
+
 impl LookUniform {
     /// `first` are the first rigid and the first static particle.
     pub fn new(show: &Show, style: &Style, first: [u32; 2]) -> Self {
@@ -118,7 +121,11 @@ impl LookUniform {
         // a typical depth: a quarter of the domain's diagonal
         let depth = 0.25 * (show.bounds[1] - show.bounds[0]).length();
         let murk = style.murk / depth;
-        let usual = if show.swimmers && style.fluid == Fluid::Balls { SHEER } else { RADIUS };
+        let usual = match style.fluid {
+            Fluid::Balls | Fluid::Sprites if style.lines != Lines::None => SPECK,
+            Fluid::Balls | Fluid::Sprites if show.swimmers => SHEER,
+            _ => RADIUS,
+        };
         let quantity = ColorBy::ALL.iter().position(|c| c.0 == style.color).unwrap_or(0) as u32;
         let strong = if style.smoothing == Smoothing::CurvatureFlow { 0.9 } else { 2.4 };
         Self {

@@ -8,11 +8,10 @@ mod graphs;
 mod hand;
 mod panels;
 mod sim;
-mod trails;
 
-use crate::gpu::{Place, Renderer};
+use crate::gpu::{Pipelines, Place, Renderer};
 use crate::style::{ColorBy, Fluid};
-use crate::{Camera, Frame, Style};
+use crate::{Camera, Curves, Frame, Style};
 use egui_wgpu::{RendererOptions, ScreenDescriptor};
 use glam::{Vec2, Vec3, vec2};
 use hand::{Held, Ray, Tool};
@@ -24,7 +23,6 @@ use std::collections::HashSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
-use trails::Trails;
 use winit::application::ApplicationHandler;
 use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
@@ -65,7 +63,8 @@ pub fn has_display() -> bool {
     cfg!(any(windows, target_os = "macos")) || named("DISPLAY") || named("WAYLAND_DISPLAY")
 }
 
-/// Opens the window; returns when it is closed. With `JETSAM_TIMES` in the environment, stderr says when the first picture was there.
+/// Opens the window; returns when it is closed. With `JETSAM_TIMES` in the environment, stderr says when window, device,
+/// pipelines, world and the first picture were there.
 ///
 /// # Errors
 /// No display, or no device that can draw in its window.
@@ -81,6 +80,13 @@ pub fn open(options: Options) -> Result<(), WindowError> {
 /// A number with three digits that count.
 fn number(x: f64) -> String {
     crate::number(x as f32)
+}
+
+/// How long something took since the start, for those who asked for times.
+fn tell_time(what: &str, start: Instant) {
+    if std::env::var_os("JETSAM_TIMES").is_some() {
+        eprintln!("{what} after {:.2} s", start.elapsed().as_secs_f64());
+    }
 }
 
 struct App {
@@ -140,6 +146,10 @@ struct Live {
     config: wgpu::SurfaceConfiguration,
     gpu: Gpu,
     renderer: Option<Renderer>,
+    /// Those of the first style, compiled while the world is built.
+    pipelines: Option<Pipelines>,
+    /// The simulation begins to run once its first moment is seen: until then the processor has enough to do.
+    begin: bool,
     egui: egui_winit::State,
     paint: egui_wgpu::Renderer,
     sim: Sim,
@@ -147,7 +157,9 @@ struct Live {
     frame: Frame,
     serial: u64,
     camera: Camera,
-    trails: Trails,
+    curves: Curves,
+    /// Whether the simulation was asked to bring the particles home.
+    at_home: bool,
     mouse: Mouse,
     keys: HashSet<KeyCode>,
     control: bool,
@@ -285,13 +297,15 @@ impl Live {
         };
         let (device, received) = std::sync::mpsc::channel();
         let on = (options.backend, received);
-        let sim = Sim::start(options.name, options.scene, options.playing, on, wake).map_err(|e| refused(&e))?;
+        let sim = Sim::start(options.name, options.scene, false, on, wake).map_err(|e| refused(&e))?;
         let size = winit::dpi::LogicalSize::new(1440.0, 860.0);
         let attributes = Window::default_attributes().with_title("jetsam").with_inner_size(size);
         let window = Arc::new(event_loop.create_window(attributes).map_err(|e| refused(&e))?);
+        tell_time("window", start);
         let instance = instance();
         let surface = instance.create_surface(window.clone()).map_err(|e| refused(&e))?;
         let (gpu, capabilities) = Gpu::open_for(&instance, &surface)?;
+        tell_time("device", start);
         // one that computes nothing does not listen
         let _ = device.send(gpu.clone());
         let plain = capabilities.formats.iter().find(|f| !f.is_srgb() && f.components() == 4);
@@ -309,10 +323,13 @@ impl Live {
             view_formats: Vec::new(),
         };
         config.alpha_mode = wgpu::CompositeAlphaMode::Auto;
-        gpu.attempt(|| {
+        let pipelines = gpu.attempt(|| {
             surface.configure(&gpu.device, &config);
-            Ok(())
+            let pipelines = Pipelines::new(&gpu.device, format);
+            pipelines.prepare(&options.style);
+            Ok(Some(pipelines))
         })?;
+        tell_time("pipelines", start);
         let context = egui::Context::default();
         let side = gpu.device.limits().max_texture_dimension_2d as usize;
         let egui = egui_winit::State::new(context, egui::ViewportId::ROOT, &window, None, None, Some(side));
@@ -328,6 +345,8 @@ impl Live {
             config,
             gpu,
             renderer: None,
+            pipelines,
+            begin: options.playing,
             egui,
             paint,
             sim,
@@ -335,7 +354,8 @@ impl Live {
             frame: Frame::default(),
             serial: 0,
             camera,
-            trails: Trails::default(),
+            curves: Curves::default(),
+            at_home: false,
             mouse: Mouse::default(),
             keys: HashSet::new(),
             control: false,
@@ -391,12 +411,15 @@ impl Live {
                 self.camera = show.camera;
             }
             self.mouse.held = None;
-            self.trails.clear();
+            self.curves.clear();
             match &mut self.renderer {
                 Some(renderer) => renderer.set_show(show),
                 None => {
+                    tell_time("world", self.start);
                     let (device, queue) = (&self.gpu.device, &self.gpu.queue);
-                    self.renderer = Some(Renderer::new(device, queue, self.config.format, show));
+                    let pipelines = self.pipelines.take();
+                    let pipelines = pipelines.unwrap_or_else(|| Pipelines::new(device, self.config.format));
+                    self.renderer = Some(Renderer::new(device, queue, pipelines, show));
                 }
             }
         } else if shown.serial == self.serial {
@@ -408,9 +431,7 @@ impl Live {
         if let Some(renderer) = &mut self.renderer {
             renderer.load(&self.frame);
         }
-        if self.panels.style.trails {
-            self.trails.note(&self.frame);
-        }
+        self.curves.note(&self.frame, &self.panels.style);
     }
 
     fn redraw(&mut self) -> Result<(), WindowError> {
@@ -440,6 +461,10 @@ impl Live {
                 panels::headline(ui, rect, panels);
             }
         });
+        if self.panels.style.at_home() != self.at_home {
+            self.at_home = !self.at_home;
+            orders.push(Order::Home(self.at_home));
+        }
         orders.into_iter().for_each(|order| self.sim.order(order));
         if let (Some(Wish::Home), Some(renderer)) = (wish, &self.renderer) {
             self.camera = renderer.show().camera;
@@ -455,6 +480,9 @@ impl Live {
         self.mouse.rect = rect;
         let primitives = context.tessellate(output.shapes, scale);
         self.present(&primitives, &output.textures_delta, scale, look || changed)?;
+        if self.renderer.is_some() && std::mem::take(&mut self.begin) {
+            self.sim.order(Order::Play(true));
+        }
         self.tell_title();
         Ok(())
     }
@@ -500,8 +528,7 @@ impl Live {
             if let Some(renderer) = &mut self.renderer {
                 let style = self.pacer.thrifty(&self.panels.style, self.resting);
                 if picture || !renderer.again(&mut encoder, place) {
-                    let jump = 4.0 * renderer.show().spacing;
-                    let lines = if style.trails { self.trails.lines(jump) } else { Vec::new() };
+                    let lines = self.curves.lines(renderer.show(), &self.frame, &style);
                     renderer.draw(&mut encoder, place, &self.camera, &style, &lines);
                 }
             }
@@ -558,8 +585,8 @@ impl Live {
         let title = format!("jetsam - {} - {:.2} s - {state}", p.name, p.numbers.time);
         if title != self.title {
             self.window.set_title(&title);
-            if self.title.is_empty() && self.renderer.is_some() && std::env::var_os("JETSAM_TIMES").is_some() {
-                eprintln!("first picture after {:.2} s", self.start.elapsed().as_secs_f64());
+            if self.title.is_empty() && self.renderer.is_some() {
+                tell_time("first picture", self.start);
             }
             if self.renderer.is_some() {
                 self.title = title;

@@ -6,7 +6,7 @@ use super::hand::Tool;
 use super::sim::{Numbers, Order, Shown};
 use crate::Style;
 use crate::color::Map;
-use crate::style::{Bodies, ColorBy, Fluid, Smoothing};
+use crate::style::{Bodies, ColorBy, Fluid, Lines, Smoothing};
 use egui::{Align2, Color32, ComboBox, Panel, RichText, Slider, Ui};
 use jetsam::scene::builtin::SCENES;
 use std::path::PathBuf;
@@ -93,9 +93,9 @@ impl Panels {
     fn message_line(&self, ui: &mut Ui) {
         let keys = "space play  n step  r reset  1 2 3 hand  v fluid  c colours  f fly (wasd qe)  tab panels";
         ui.horizontal(|ui| match (&self.busy, &self.message) {
+            // nothing that moves: panels are not drawn again and again while there is work to do
             (Some(what), _) => {
-                ui.spinner();
-                ui.label(*what);
+                ui.label(format!("{what} ..."));
             }
             (None, Some((text, bad))) => {
                 let color = if *bad { Color32::from_rgb(230, 90, 70) } else { ui.visuals().text_color() };
@@ -197,13 +197,11 @@ impl Panels {
         }
         choose(ui, "scale", &mut s.map, &Map::ALL.map(|m| (m, m.name())));
         let mut arrows = s.arrows > 0.0;
+        choose(ui, "lines", &mut s.lines, &Lines::ALL);
         ui.horizontal(|ui| {
             if ui.checkbox(&mut arrows, "arrows").changed() {
                 s.arrows = if arrows { 0.05 } else { 0.0 };
             }
-            ui.checkbox(&mut s.trails, "trails");
-        });
-        ui.horizontal(|ui| {
             ui.checkbox(&mut s.shadows, "shadows");
             ui.checkbox(&mut s.edges, "edges");
         });

@@ -40,6 +40,8 @@ pub enum Order {
     Scare(Vec3),
     /// The scene is written to a file.
     Save(PathBuf),
+    /// Whether particles come home from the device with each moment, besides being drawn there.
+    Home(bool),
 }
 
 /// Numbers of the newest moment.
@@ -107,7 +109,9 @@ impl Sim {
             // the processor need not wait for a device
             let gpu = if choice == Choice::Cpu { None } else { device.recv().ok() };
             let wake = Box::new(wake);
-            let mut worker = Worker { shown: theirs, wake, playing, pace: 1.0, scene, name, world: None, choice, gpu };
+            let (shown, world) = (theirs, None);
+            let mut worker =
+                Worker { shown, wake, playing, pace: 1.0, scene, name, world, choice, gpu, at_home: false };
             worker.open(true);
             worker.run(&inbox);
         };
@@ -150,6 +154,7 @@ struct Worker {
     world: Option<World>,
     choice: Choice,
     gpu: Option<Gpu>,
+    at_home: bool,
 }
 
 impl Worker {
@@ -252,6 +257,10 @@ impl Worker {
                     self.world.iter_mut().for_each(|w| {
                         w.scare(place.as_dvec3(), radius);
                     });
+                }
+                Order::Home(at_home) => {
+                    self.at_home = at_home;
+                    self.publish(|_| ());
                 }
                 Order::Save(path) => match self.scene.save(&path) {
                     Ok(()) => self.say(format!("saved to {}", path.display()), false),
@@ -425,7 +434,11 @@ impl Worker {
         let n = &mut shown.numbers;
         fill(n);
         if let Some(world) = &self.world {
-            shown.frame.borrow(world);
+            if self.at_home {
+                shown.frame.take(world)
+            } else {
+                shown.frame.borrow(world)
+            }
             (n.time, n.steps, n.ledger) = (world.time(), world.steps(), world.ledger().clone());
             n.momentum_residual = world.momentum_residual();
             let count = shown.frame.lent.as_ref().map_or(shown.frame.count, |lent| lent.count);

@@ -16,6 +16,9 @@ use glam::DVec3;
 /// is thinner than particles can show.
 const NO_SLIP_BELOW: f64 = 1000.0;
 
+/// Tag of fluids among what takes room.
+const FLUID: u32 = 1;
+
 /// A fluid particle on its way into the state.
 pub(super) struct Drop {
     /// Place (m).
@@ -46,6 +49,7 @@ impl Scene {
         let mut fluid: Vec<Drop> = Vec::new();
         let starts = self.starts()?;
         let (mut carved, mut outside) = (0, 0);
+        let mut taken = Near::new(support);
         for (index, f) in self.fluid.iter().enumerate() {
             let key = format!("fluid.{index}.shape");
             let Some(shape) = &f.shape else { continue };
@@ -60,6 +64,9 @@ impl Scene {
                     outside += 1;
                 } else if carver.has(p, None) {
                     carved += 1;
+                    if carver.has(p, Some(FLUID)) {
+                        taken.insert(p);
+                    }
                 } else {
                     fluid.push(Drop { x: p, v: DVec3::ZERO, fluid: index as u32, density: 1.0 });
                 }
@@ -69,7 +76,7 @@ impl Scene {
                 return Err(self.error(&key, message, "move or enlarge the shape, or choose a smaller spacing"));
             }
             for drop in &fluid[before..] {
-                carver.insert(drop.x);
+                carver.insert_tagged(drop.x, FLUID);
             }
         }
         if carved > 0 {
@@ -79,12 +86,14 @@ impl Scene {
             warnings.push(format!("{outside} fluid particles outside the domain were left out"));
         }
 
+        let gaps = self.gaps(&fluid, bodies, &taken);
         starts.jitter(self, &mut fluid, &grid);
         let sources = self.sources()?;
         starts.set_velocities(self, &mut fluid)?;
         let largest_speed = self.largest_speed(&fluid, bodies, &sources, gravity, &grid);
         let sound_speed = self.solver.sound_speed.unwrap_or(10.0 * largest_speed);
         self.squeeze(&mut fluid, gravity, sound_speed);
+        fluid.iter_mut().zip(gaps).for_each(|(drop, gap)| drop.density *= 1.0 - gap);
         let cohesion = cohesion_moment(support, self.world.dimensions);
         let curvature = curvature_moment(self.solver.kernel.force(), support, self.world.dimensions);
         let fluids: Vec<FluidModel> = self
@@ -260,6 +269,46 @@ impl Scene {
         }
         // a scene in which nothing moves still needs a scale: a spacing in a tenth of a second
         if speed > 0.0 { speed } else { 10.0 * self.resolution.spacing }
+    }
+
+    /// Where fluid was carved away for bodies: by how much the density of each particle is less than in a full lattice. Lattices
+    /// that do not match leave gaps; an integrated density would never know of them, and bodies would displace too much. A
+    /// summed one sees for itself.
+    fn gaps(&self, fluid: &[Drop], bodies: &[NewBody], taken: &Near) -> Vec<f64> {
+        if self.solver.density != Density::Continuity || taken.is_empty() {
+            return vec![0.0; fluid.len()];
+        }
+        let (spacing, dimensions) = (self.resolution.spacing, self.world.dimensions);
+        let support = self.solver.support * spacing;
+        let kernel = self.solver.kernel.density();
+        let w = |r: f64| kernel.value(r, support, dimensions);
+        let full = kernel.lattice_sum(self.solver.support, dimensions);
+        let volume = spacing.powi(dimensions as i32);
+        let mut volumes = Vec::new();
+        let mut put = Near::new(support);
+        for body in bodies {
+            for (p, v) in body.points().zip(&body.particle_volume) {
+                // of bodies, what stands where fluid was
+                if taken.sum(p, |r| f64::from(r < spacing)) > 0.0 {
+                    put.insert_tagged(p, volumes.len() as u32);
+                    volumes.push(*v);
+                }
+            }
+        }
+        let gap = |drop: &Drop| {
+            let before = volume * taken.sum(drop.x, w);
+            if before == 0.0 {
+                return 0.0;
+            }
+            let mut now = 0.0;
+            put.around(drop.x, |d, k| {
+                if d.length() < support {
+                    now += volumes[k as usize] * w(d.length());
+                }
+            });
+            ((before - now) / full).max(0.0)
+        };
+        fluid.iter().map(gap).collect()
     }
 
     /// Squeezes fluids that start hydrostatic: the equation of state then holds up what stands above.

@@ -20,6 +20,10 @@ impl Near {
         near
     }
 
+    pub(super) fn is_empty(&self) -> bool {
+        self.cells.is_empty()
+    }
+
     fn key(&self, p: DVec3) -> [i64; 3] {
         (p / self.radius).floor().as_i64vec3().to_array()
     }

@@ -18,7 +18,7 @@ use crate::ledger::Ledger;
 use crate::model::Model;
 use crate::scene::{Density, Pressure};
 use crate::stage::Stage;
-use crate::state::{Body, Kind, Record, State, Touch};
+use crate::state::{Body, Kind, Record, Slips, State, Touch};
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use implicit::Implicit;
@@ -42,6 +42,8 @@ pub struct Cpu {
     /// Summed densities where they are integrated; else empty.
     summed: Vec<f32>,
     parts: Vec<bodies::Part>,
+    /// Slips of contacts found by forces, chunk by chunk, of rigid and of static particles (none).
+    slips: [Vec<Vec<Slips>>; 2],
     particle_mass: Vec<f32>,
     /// Angular velocity of each body (rad/s), for contacts.
     spin: Vec<[f32; 3]>,
@@ -91,6 +93,7 @@ impl Default for Cpu {
             mirror: Vec::new(),
             summed: Vec::new(),
             parts: Vec::new(),
+            slips: Default::default(),
             particle_mass: Vec::new(),
             spin: Vec::new(),
             sharers: Vec::new(),
@@ -496,7 +499,7 @@ impl Cpu {
         self.rest.extend(b.body.iter().map(sleep::rest));
         self.stirred.iter_mut().for_each(|s| *s.get_mut() = false);
         let (spin, sharers, rest, stirred) = (&self.spin, &self.sharers, &self.rest, &self.stirred);
-        let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slip: &b.slip, sharers, rest, stirred, spin };
+        let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slips: &b.slips, sharers, rest, stirred, spin };
         let gravity = model.gravity_at(advance.end()).as_vec3();
         let bodies_first = p.first[Kind::Rigid as usize];
         let (mirror, gradient) = (&self.mirror[..], &p.gradient[..]);
@@ -510,7 +513,8 @@ impl Cpu {
                         chunk: &NeighbourChunk,
                         carry: &mut _,
                         vorticity: &mut _,
-                        touch: &mut [Touch]| {
+                        touch: &mut [Touch],
+                        slips: &mut Vec<Slips>| {
                 if !chunk.found && kind == Kind::Static {
                     touch.fill(Touch::default());
                     return push.fill([0.0; 3]);
@@ -529,12 +533,17 @@ impl Cpu {
                     dt,
                     fastest,
                 };
-                let out = forces::Output { push, carry, vorticity, touch };
+                let out = forces::Output { push, carry, vorticity, touch, slips };
                 dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, out));
             };
             if kind != Kind::Fluid {
                 let touch = p.touch[first - bodies_first..].par_chunks_mut(CHUNK);
-                chunks.zip(touch).for_each(|((c, (push, chunk)), touch)| work(c, push, chunk, &mut [], &mut [], touch));
+                // what stands remembers nothing
+                let slips = &mut self.slips[usize::from(kind == Kind::Static)];
+                slips.resize_with(p.count[kind as usize].div_ceil(CHUNK), Vec::new);
+                chunks.zip(touch).zip(slips).for_each(|(((c, (push, chunk)), touch), slips)| {
+                    work(c, push, chunk, &mut [], &mut [], touch, slips);
+                });
                 continue;
             }
             match (!p.carry.is_empty(), !gradient.is_empty()) {
@@ -542,18 +551,24 @@ impl Cpu {
                     let (carry, vorticity) = (p.carry.par_chunks_mut(CHUNK), p.vorticity.par_chunks_mut(CHUNK));
                     let all = chunks.zip(carry).zip(vorticity);
                     all.for_each(|(((c, (push, chunk)), carry), vorticity)| {
-                        work(c, push, chunk, carry, vorticity, &mut [])
+                        work(c, push, chunk, carry, vorticity, &mut [], &mut Vec::new())
                     });
                 }
                 (true, false) => {
                     let all = chunks.zip(p.carry.par_chunks_mut(CHUNK));
-                    all.for_each(|((c, (push, chunk)), carry)| work(c, push, chunk, carry, &mut [], &mut []));
+                    all.for_each(|((c, (push, chunk)), carry)| {
+                        work(c, push, chunk, carry, &mut [], &mut [], &mut Vec::new())
+                    });
                 }
                 (false, true) => {
                     let all = chunks.zip(p.vorticity.par_chunks_mut(CHUNK));
-                    all.for_each(|((c, (push, chunk)), vorticity)| work(c, push, chunk, &mut [], vorticity, &mut []));
+                    all.for_each(|((c, (push, chunk)), vorticity)| {
+                        work(c, push, chunk, &mut [], vorticity, &mut [], &mut Vec::new())
+                    });
                 }
-                (false, false) => chunks.for_each(|(c, (push, chunk))| work(c, push, chunk, &mut [], &mut [], &mut [])),
+                (false, false) => chunks.for_each(|(c, (push, chunk))| {
+                    work(c, push, chunk, &mut [], &mut [], &mut [], &mut Vec::new());
+                }),
             }
         }
     }
@@ -584,9 +599,16 @@ impl Cpu {
             body.deep |= far && !body.is_static();
             self.ledger.fast_contacts += u64::from(body.deep && !before && !body.is_static());
         }
-        b.slip[..b.rigid_slots].par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(slot, slip)| {
-            if !b.body[b.owner[slot] as usize].asleep {
-                *slip = felt(slot).map_or([0.0; 3], |(_, touch)| touch.slip);
+        let found = &self.slips[0];
+        b.slips.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(slot, slips)| {
+            if b.body[b.owner[slot] as usize].asleep {
+                return;
+            }
+            let at = place[slot].load(Relaxed) as usize;
+            match felt(slot).map_or(0, |(_, touch)| touch.slips) {
+                0 if slips.is_empty() => {}
+                0 => *slips = Slips::default(),
+                own => *slips = found[(at - first) / CHUNK][own as usize - 1],
             }
         });
     }

@@ -4,7 +4,7 @@
 //! closer to any of them than 1.25 spacings is outside.
 
 use super::model::FlockConstants;
-use super::perception::image;
+
 use super::stage::World;
 use crate::state::{Kind, Record};
 use glam::Vec3;
@@ -38,15 +38,15 @@ pub fn each_near(world: &World, kind: Kind, x: [f32; 3], radius: f32, mut f: imp
         }
     };
     for cz in low[2]..=high[2] {
-        let Some((z, shift_z)) = image(grid, 2, cz) else { continue };
+        let Some((z, shift_z)) = grid.image(2, cz) else { continue };
         for cy in low[1]..=high[1] {
-            let Some((y, shift_y)) = image(grid, 1, cy) else { continue };
+            let Some((y, shift_y)) = grid.image(1, cy) else { continue };
             if grid.period[0] == 0.0 {
                 row(cells.row(low[0], high[0], y, z), [0.0, shift_y, shift_z]);
                 continue;
             }
             for cx in low[0]..=high[0] {
-                let Some((x, shift_x)) = image(grid, 0, cx) else { continue };
+                let Some((x, shift_x)) = grid.image(0, cx) else { continue };
                 row(cells.row(x, x, y, z), [shift_x, shift_y, shift_z]);
             }
         }

@@ -197,8 +197,8 @@ impl Tile {
             true => from[a] - far[a]..=to + far[a],
             false => (from[a] - far[a]).max(0)..=(to + far[a]).min(grid.cells[a] - 1),
         };
-        for (z, shift_z) in reach(2, from[2]).filter_map(|c| image(grid, 2, c)) {
-            for (y, shift_y) in reach(1, from[1]).filter_map(|c| image(grid, 1, c)) {
+        for (z, shift_z) in reach(2, from[2]).filter_map(|c| grid.image(2, c)) {
+            for (y, shift_y) in reach(1, from[1]).filter_map(|c| grid.image(1, c)) {
                 if !cells.row(0, grid.cells[0] - 1, y, z).is_empty() {
                     self.rows.push([(y, shift_y), (z, shift_z)]);
                 }
@@ -206,7 +206,7 @@ impl Tile {
         }
         for cx in from[0] - far[0]..=to + far[0] {
             self.slabs.push(self.len);
-            let Some((x, shift_x)) = image(grid, 0, cx) else { continue };
+            let Some((x, shift_x)) = grid.image(0, cx) else { continue };
             for r in 0..self.rows.len() {
                 let [(y, shift_y), (z, shift_z)] = self.rows[r];
                 let row = cells.row(x, x, y, z);
@@ -222,17 +222,5 @@ impl Tile {
     #[inline(always)]
     pub fn look(&mut self, range: Range<usize>) {
         self.window = self.slabs[range.start] / LANES..padded(self.slabs[range.end]) / LANES;
-    }
-}
-
-/// The cell on axis `a` that stands at coordinate `c`, and how far its agents are to be shifted.
-#[inline(always)]
-pub fn image(grid: &Grid, a: usize, c: i32) -> Option<(i32, f32)> {
-    let n = grid.cells[a];
-    match c {
-        _ if (0..n).contains(&c) => Some((c, 0.0)),
-        _ if grid.period[a] == 0.0 => None,
-        _ if c < 0 => Some((c + n, -grid.period[a])),
-        _ => Some((c - n, grid.period[a])),
     }
 }

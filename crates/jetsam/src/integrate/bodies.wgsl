@@ -78,7 +78,17 @@ fn plus(a: PartSum, b: PartSum) -> PartSum {
                  a.torque_fluid + b.torque_fluid, a.torque_contact + b.torque_contact);
 }
 
-// One workgroup sums the slots of a part of a body in a fixed order, and each slot takes over its slip.
+// A slot takes over the slips of its contacts; none where it is outside the domain.
+fn take_slips(s: u32, inside: bool) {
+  for (var k = 0u; k < 8u; k += 1u) {
+    var held = vec4<u32>(0u, 0u, 0u, GONE);
+    if (inside) { held = slips[m.count.y + s].held[k]; }
+    slips[s].held[k] = held;
+    if (held.w == GONE) { break; }
+  }
+}
+
+// One workgroup sums the slots of a part of a body in a fixed order, and each slot takes over the slips of its contacts.
 @compute @workgroup_size(128)
 fn sum_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let k = g.y * n.x + g.x;
@@ -88,7 +98,6 @@ fn sum_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: ve
     let s = part.first + l;
     if (s < part.end) {
       let at = slots[s].place;
-      var slip = vec4<f32>(0.0);
       if (at != GONE) {
         let f = push[at].xyz;
         let t = touch[at - m.count.x];
@@ -99,9 +108,8 @@ fn sum_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: ve
         own.torque = vec4<f32>(cross(arm, f) + t.couple.xyz, 0.0);
         own.torque_fluid = vec4<f32>(cross(arm, t.fluid.xyz), 0.0);
         own.torque_contact = vec4<f32>(cross(arm, t.contact.xyz) + t.couple.xyz, 0.0);
-        slip = t.slip;
       }
-      if (s < m.count.y) { slots[s].slip = slip; }
+      if (RUBS && s < m.count.y) { take_slips(s, at != GONE); }
     }
   }
   tree[l] = own;

@@ -16,7 +16,7 @@ struct Joint {
   turn: vec4<f32>,        // orientation of a seen from b at the beginning
   law: vec4<f32>,         // spring constant (N/m), dashpot (N s/m), rest length (m), largest speed of the scene (m/s)
   limits: vec4<f32>,      // of a hinge (rad); z: 1 where there are any
-  who: vec4<u32>,         // kind, body a, body b or GONE, 1 where they do not touch each other
+  who: vec4<u32>,         // kind, body a, body b or GONE
 }
 
 // One end of a joint. x and rest: place and what rounding left over of it.

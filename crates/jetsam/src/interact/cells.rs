@@ -95,6 +95,19 @@ impl Grid {
         (c[2] as usize * self.cells[1] as usize + c[1] as usize) * self.cells[0] as usize + c[0] as usize
     }
 
+    /// The cell on axis `a` that stands at coordinate `c`, and how far what is in it is to be shifted (m); none beyond a side that is not
+    /// periodic.
+    #[inline(always)]
+    pub fn image(&self, a: usize, c: i32) -> Option<(i32, f32)> {
+        let n = self.cells[a];
+        match c {
+            _ if (0..n).contains(&c) => Some((c, 0.0)),
+            _ if self.period[a] == 0.0 => None,
+            _ if c < 0 => Some((c + n, -self.period[a])),
+            _ => Some((c - n, self.period[a])),
+        }
+    }
+
     /// Brings a position on periodic axes back into the domain.
     #[inline]
     pub fn wrap(&self, x: &mut [f32; 3]) {

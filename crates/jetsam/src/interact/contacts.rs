@@ -1,15 +1,14 @@
 //! Contacts of particles of different bodies (E10-E13), seen from one of them; called by the stage `forces`.
 //!
-//! In: the neighbours of a body's particle, surface normals, tangential slips, spins. Out: a [`Touch`]: force, the couple
-//! of forces that act where two particles touch, the slip that friction remembers, what was counted.
+//! In: the neighbours of a body's particle, surface normals, slips of contacts, spins. Out: a [`Touch`]: force, the couple
+//! of forces that act where two particles touch, what was counted; and [`Slips`], what friction remembers of each contact.
 
 use super::forces::Input;
 use super::pairs::wrap;
 use crate::integrate::sleep::Rest;
 use crate::laws::contact;
-use crate::model::Model;
 use crate::scene::{Damping, Surface};
-use crate::state::Touch;
+use crate::state::{HELD_CONTACTS, Slips, Touch};
 use glam::Vec3;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -20,8 +19,8 @@ pub struct Surfaces<'a> {
     pub slot: &'a [u32],
     /// Outward normals in world axes, by slot: see [`crate::state::Bodies::facing`].
     pub facing: &'a [[f32; 3]],
-    /// Tangential slips (m), by slot.
-    pub slip: &'a [[f32; 3]],
+    /// Slips of contacts, by slot of rigid bodies; empty where no body rubs.
+    pub slips: &'a [Slips],
     /// Contacts that shared the load at the last step, by body.
     pub sharers: &'a [f32],
     /// Whether each body moves, is still, or sleeps.
@@ -43,10 +42,31 @@ impl Surfaces<'_> {
         }
     }
 
+    /// Whether the first of a pair is the one that remembers its slip. One that sleeps remembers what it knew before.
+    #[inline(always)]
+    fn keeps(&self, pair: Pair) -> bool {
+        pair.slot[0] < pair.slot[1] || self.asleep(pair.body[1])
+    }
+
+    #[inline(always)]
+    fn asleep(&self, body: u32) -> bool {
+        self.rest[body as usize] == Rest::Asleep
+    }
+
+    /// The slip of a contact up to now (m), seen from the first of the pair: the exact opposite of what the other sees.
+    #[inline(always)]
+    fn slip(&self, pair: Pair) -> [f32; 3] {
+        let of = |one: usize, other: usize| self.slips.get(one).and_then(|s| s.of(other as u32));
+        let [own, other] = pair.slot;
+        let mine = if self.keeps(pair) { of(own, other) } else { None };
+        let theirs = || of(other, own).filter(|_| own > other || self.asleep(pair.body[1])).map(|s| s.map(|x| -x));
+        mine.or_else(theirs).unwrap_or_default()
+    }
+
     /// Notes that fluid is near body `b`.
     #[inline(always)]
     pub fn wet(&self, b: u32) {
-        if self.rest[b as usize] == Rest::Asleep {
+        if self.asleep(b) {
             self.stirred[b as usize].store(true, Relaxed);
         }
     }
@@ -57,7 +77,7 @@ pub(crate) const DEEP: f32 = 0.5;
 /// It is stopped if its kinetic energy is so many times what the springs may still take.
 pub(crate) const HELD: f32 = 1.05;
 
-/// Adds the contacts with the particles in `list` to `touch`; `friction` collects what the slip is derived from.
+/// Adds the contacts with the particles in `list` to `touch`; `friction` remembers their slips.
 #[inline(always)]
 pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &mut Friction) {
     let (model, surfaces) = (input.model, &input.surfaces);
@@ -125,18 +145,9 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
             surfaces.stir(owner, body);
             touch.sharers += part;
             if !full {
-                let slip = Vec3::from(surfaces.slip[slot]) - Vec3::from(surfaces.slip[other_slot]);
                 let springs = model.friction_pair(owner, body, k * part, part, counted);
-                f += friction.pair(
-                    model,
-                    [owner, body],
-                    springs,
-                    slip,
-                    v - n * speed,
-                    (-f.dot(n)).max(0.0),
-                    n,
-                    input.dt,
-                );
+                let pair = Pair { slot: [slot, other_slot], body: [owner, body] };
+                f += friction.pair(input, pair, springs, v - n * speed, (-f.dot(n)).max(0.0), n);
             }
         }
         touch.contact = (Vec3::from(touch.contact) + f).to_array();
@@ -146,47 +157,73 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
     }
 }
 
-/// Friction of one particle over all its contacts (E13; Cundall and Strack 1979).
+/// Friction of one particle at all its contacts (E13; Cundall and Strack 1979; Luding 2008): what it goes on remembering of them.
 #[derive(Default)]
 pub struct Friction {
-    pull: Vec3,
-    stiffness: f32,
+    slips: Slips,
+    load: [f32; HELD_CONTACTS],
+}
+
+/// Who touches whom: slots and bodies of this particle and of the other.
+#[derive(Clone, Copy)]
+struct Pair {
+    slot: [usize; 2],
+    body: [u32; 2],
 }
 
 impl Friction {
-    /// Tangential force of a pair. `slip` and `v` are those of the other particle relative to this one, `load` the
-    /// normal force; the springs are those of [`Model::friction_pair`].
+    /// Tangential force of a pair with the springs of [`Model::friction_pair`]. `v`: tangential velocity of the other relative to
+    /// this one, `load`: the normal force, `n`: the normal towards the other.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)] // one caller
     fn pair(
         &mut self,
-        model: &Model,
-        pair: [u32; 2],
+        input: &Input,
+        pair: Pair,
         (k_t, eta_t, mu): (f32, f32, f32),
-        slip: Vec3,
         v: Vec3,
         load: f32,
         n: Vec3,
-        dt: f32,
     ) -> Vec3 {
         if mu <= 0.0 {
             return Vec3::ZERO;
         }
-        // both particles remember the slip of a pair of moving bodies
-        let share = if model.moves(pair[0]) && model.moves(pair[1]) { 0.5 } else { 1.0 };
-        let slip = share * (slip - n * slip.dot(n)) + v * dt;
+        let (surfaces, dt) = (&input.surfaces, input.dt);
+        let spin = pair.body.map(|body| Vec3::from(surfaces.spin[body as usize]));
+        let turn = 0.5 * dt * (spin[0] + spin[1]).dot(n);
+        let slip = contact::slip_carried(surfaces.slip(pair), n.to_array(), turn);
+        let slip = Vec3::new(slip.x, slip.y, slip.z) + v * dt;
         let limit = mu * load;
         let spring = contact::friction((k_t * slip).to_array(), limit);
         let spring = Vec3::new(spring.x, spring.y, spring.z);
+        if surfaces.keeps(pair) && k_t > 0.0 {
+            self.keep(pair.slot[1] as u32, (spring / k_t).to_array(), load);
+        }
         let total = contact::friction((spring + eta_t * v).to_array(), limit);
-        self.pull += spring;
-        self.stiffness += k_t;
         Vec3::new(total.x, total.y, total.z)
     }
 
-    /// The slip to remember (m): what the springs of all contacts stand for together.
+    /// Remembers the slip of a contact; where there are too many, the one that bears least is forgotten.
     #[inline(always)]
-    pub fn slip(&self) -> [f32; 3] {
-        if self.stiffness > 0.0 { (self.pull / self.stiffness).to_array() } else { [0.0; 3] }
+    fn keep(&mut self, with: u32, slip: [f32; 3], load: f32) {
+        let mut weakest = 0;
+        for k in 0..HELD_CONTACTS {
+            if self.slips.with[k] == Slips::NONE {
+                (self.slips.with[k], self.slips.slip[k], self.load[k]) = (with, slip, load);
+                return;
+            }
+            if self.load[k] < self.load[weakest] {
+                weakest = k;
+            }
+        }
+        if load > self.load[weakest] {
+            (self.slips.with[weakest], self.slips.slip[weakest], self.load[weakest]) = (with, slip, load);
+        }
+    }
+
+    /// What is remembered.
+    #[inline(always)]
+    pub fn slips(&self) -> Option<Slips> {
+        (!self.slips.is_empty()).then_some(self.slips)
     }
 }

@@ -15,10 +15,38 @@ fn coupling_pair(fluid_mass: f32, body: u32) -> vec2<f32> {
 }
 
 // What a particle feels by contacts.
-struct Felt { force: vec3<f32>, contacts: f32, couple: vec3<f32>, sharers: f32, pull: vec3<f32>, stiffness: f32, deep: f32 }
+struct Felt { force: vec3<f32>, contacts: f32, couple: vec3<f32>, sharers: f32, deep: f32, held: u32, load: array<f32, 8> }
 
-// Tangential force of a pair (E13; Cundall and Strack 1979).
-fn rub(felt: ptr<function, Felt>, a: Body, b: Body, k: f32, part: f32, counted: f32, slip: vec3<f32>, v: vec3<f32>, load: f32, n: vec3<f32>) -> vec3<f32> {
+// The slip of a contact up to now (m), seen from slot `own`: the lower of two slots keeps it.
+fn slip_between(own: u32, other: u32) -> vec3<f32> {
+  let keeper = min(own, other);
+  let partner = max(own, other);
+  for (var k = 0u; k < 8u; k += 1u) {
+    let held = slips[keeper].held[k];
+    if (held.w == GONE) { break; }
+    if (held.w == partner) { return select(-1.0, 1.0, keeper == own) * bitcast<vec3<f32>>(held.xyz); }
+  }
+  return vec3<f32>(0.0);
+}
+
+// Remembers the slip of a contact; where there are too many, the one that bears least is forgotten.
+fn keep(felt: ptr<function, Felt>, own: u32, other: u32, slip: vec3<f32>, load: f32) {
+  var at = (*felt).held;
+  if (at == 8u) {
+    at = 0u;
+    for (var k = 1u; k < 8u; k += 1u) {
+      if ((*felt).load[k] < (*felt).load[at]) { at = k; }
+    }
+    if (load <= (*felt).load[at]) { return; }
+  } else {
+    (*felt).held += 1u;
+  }
+  (*felt).load[at] = load;
+  slips[m.count.y + own].held[at] = vec4<u32>(bitcast<vec3<u32>>(slip), other);
+}
+
+// Tangential force of a pair (E13; Cundall and Strack 1979; Luding 2008); `pair`: slots of this one and of the other.
+fn rub(felt: ptr<function, Felt>, a: Body, b: Body, pair: vec2<u32>, k: f32, part: f32, counted: f32, v: vec3<f32>, load: f32, n: vec3<f32>) -> vec3<f32> {
   var mu = sqrt(max(a.law.w * b.law.w, 0.0));
   if (a.law.w < 0.0) { mu = b.law.w; } else if (b.law.w < 0.0) { mu = a.law.w; }
   if (mu <= 0.0) { return vec3<f32>(0.0); }
@@ -26,21 +54,19 @@ fn rub(felt: ptr<function, Felt>, a: Body, b: Body, k: f32, part: f32, counted: 
   let number = max(max(a.law.y, b.law.y), counted);
   let k_t = TANGENTIAL * k;
   let eta_t = part * dashpot(TANGENTIAL_DAMPING, k_t / part * number, mass) / number;
-  // both particles remember the slip of a pair of moving bodies
-  let share = select(1.0, 0.5, a.x.w > 0.0 && b.x.w > 0.0);
-  let slid = share * (slip - n * dot(slip, n)) + v * clock.part;
+  let turn = 0.5 * clock.part * dot(a.omega.xyz + b.omega.xyz, n);
+  let slip = slip_carried(slip_between(pair.x, pair.y), n, turn) + v * clock.part;
   let limit = mu * load;
-  let held = friction(k_t * slid, limit);
-  (*felt).pull += held;
-  (*felt).stiffness += k_t;
+  let held = friction(k_t * slip, limit);
+  if (pair.x < pair.y && k_t > 0.0) { keep(felt, pair.x, pair.y, held / k_t, load); }
   return friction(held + eta_t * v, limit);
 }
 
-// Whether a joint holds two bodies together, so that they pass through each other.
+// Whether two bodies pass through each other, as a joint holds them together.
 fn joined(a: u32, b: u32) -> bool {
-  for (var k = 0u; k < HAS_JOINTS; k += 1u) {
-    let who = joints[k].who;
-    if (who.w != 0u && ((who.y == a && who.z == b) || (who.y == b && who.z == a))) { return true; }
+  for (var k = 0u; k < HAS_JOINED; k += 1u) {
+    let pair = m.joined[k];
+    if ((pair.x == a && pair.y == b) || (pair.x == b && pair.y == a)) { return true; }
   }
   return false;
 }
@@ -105,9 +131,9 @@ fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kin
     if (s < diameter) {
       (*felt).contacts += 1.0;
       (*felt).sharers += part;
-      if (!FULL_DAMPING) {
-        let slip = slots[own_slot].slip.xyz - slots[other_slot].slip.xyz;
-        f += rub(felt, a, b, k.x * part, part, counted, slip, v - n * speed, max(-dot(f, n), 0.0), n);
+      if (RUBS) {
+        let pair = vec2<u32>(own_slot, other_slot);
+        f += rub(felt, a, b, pair, k.x * part, part, counted, v - n * speed, max(-dot(f, n), 0.0), n);
       }
     }
     (*felt).force += f;

@@ -12,7 +12,7 @@ use super::pairs::{Ends, Pairs, Terms, wrap};
 use crate::laws::{contact, field};
 use crate::model::{CONTACT_REACH, Model};
 use crate::scene::{Coupling, Damping, Force};
-use crate::state::{Kind, Record, Touch};
+use crate::state::{Kind, Record, Slips, Touch};
 use fearless_simd::Simd;
 use glam::{DVec3, Vec3};
 
@@ -53,6 +53,8 @@ pub struct Output<'a> {
     pub vorticity: &'a mut [[f32; 3]],
     /// Of what the forces on bodies' particles consist.
     pub touch: &'a mut [Touch],
+    /// Slips of the contacts of those that rub, in their order; [`Touch::slips`] tells whose.
+    pub slips: &'a mut Vec<Slips>,
 }
 
 /// Forces on a chunk of particles of one kind.
@@ -68,12 +70,13 @@ pub fn chunk<S: Simd>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk,
 
 #[inline(always)]
 fn particles<S: Simd, const PLAIN: bool>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: Output) {
-    let Output { push, carry, vorticity, touch } = out;
+    let Output { push, carry, vorticity, touch, slips } = out;
+    slips.clear();
     let listed = Listed::new(simd, input.records, chunk.list());
     for (k, runs) in chunk.runs.iter().enumerate() {
         let i = input.first + k;
         if kind != Kind::Fluid {
-            (push[k], touch[k]) = on_body::<S, PLAIN>(simd, &input, kind, listed, runs, i);
+            (push[k], touch[k]) = on_body::<S, PLAIN>(simd, &input, kind, listed, runs, i, slips);
             continue;
         }
         let (pairs, mut total) = on_fluid::<S, PLAIN>(simd, &input, listed, runs, i);
@@ -158,6 +161,7 @@ fn on_body<S: Simd, const PLAIN: bool>(
     listed: Listed,
     runs: &Runs,
     i: usize,
+    slips: &mut Vec<Slips>,
 ) -> ([f32; 3], Touch) {
     let model = input.model;
     let own = &input.records[i];
@@ -190,7 +194,10 @@ fn on_body<S: Simd, const PLAIN: bool>(
     }
     force += Vec3::from(touch.contact);
     if model.moves(owner) {
-        touch.slip = friction.slip();
+        if let Some(held) = friction.slips() {
+            slips.push(held);
+            touch.slips = slips.len() as u32;
+        }
         force += fields(model, own) * input.particle_mass[owner as usize];
     }
     (force.to_array(), touch)

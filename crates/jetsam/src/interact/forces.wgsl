@@ -177,14 +177,13 @@ fn felt_by(i: u32, k: u32, by_fluid: vec3<f32>) {
   add_contacts(&felt, i, x, owner, RIGID);
   add_contacts(&felt, i, x, owner, STATIC);
   var force = by_fluid + felt.force;
-  var slip = vec3<f32>(0.0);
+  if (RUBS && k < m.count.y && felt.held < 8u) { slips[m.count.y + info[i].x].held[felt.held].w = GONE; }
   if (bodies[owner].x.w > 0.0) {
-    if (felt.stiffness > 0.0) { slip = felt.pull / felt.stiffness; }
     force += bodies[owner].stated.z * fields_at(x, records[i].v.xyz);
   }
   push[i] = vec4<f32>(force, 0.0);
   touch[k] = Touch(vec4<f32>(by_fluid, felt.sharers), vec4<f32>(felt.force, felt.contacts),
-                   vec4<f32>(felt.couple, felt.deep), vec4<f32>(slip, 0.0));
+                   vec4<f32>(felt.couple, felt.deep));
 }
 
 // Contacts of bodies alone, in a part of a step of implicit pressure.

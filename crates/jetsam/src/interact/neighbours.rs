@@ -287,9 +287,9 @@ impl Around<'_> {
         };
         let reach = |a: usize| if grid.cells[a] == 1 && grid.period[a] == 0.0 { 0..=0 } else { -1..=1 };
         for dz in reach(2) {
-            let Some((z, shift_z)) = image(grid, 2, cell[2] + dz) else { continue };
+            let Some((z, shift_z)) = grid.image(2, cell[2] + dz) else { continue };
             for dy in reach(1) {
-                let Some((y, shift_y)) = image(grid, 1, cell[1] + dy) else { continue };
+                let Some((y, shift_y)) = grid.image(1, cell[1] + dy) else { continue };
                 let (low, high, last) = (cell[0] - 1, cell[0] + 1, grid.cells[0] - 1);
                 add(low.max(0), high.min(last), y, z, [0.0, shift_y, shift_z]);
                 let period = grid.period[0];
@@ -302,17 +302,5 @@ impl Around<'_> {
             }
         }
         count
-    }
-}
-
-/// The cell on axis `a` that stands at coordinate `c`, and how far its particles are to be shifted.
-#[inline(always)]
-fn image(grid: &Grid, a: usize, c: i32) -> Option<(i32, f32)> {
-    let n = grid.cells[a];
-    match c {
-        _ if (0..n).contains(&c) => Some((c, 0.0)),
-        _ if grid.period[a] == 0.0 => None,
-        _ if c < 0 => Some((c + n, -grid.period[a])),
-        _ => Some((c - n, grid.period[a])),
     }
 }

@@ -73,3 +73,12 @@ fn contact_part(aside: f32) -> f32 {
 fn friction(pull: vec3<f32>, limit: f32) -> vec3<f32> {
   return pull * min(1.0, limit / max(length(pull), 1e-30));
 }
+
+// E13: the slip of a contact, carried along as the contact turns: about its normal by `turn` (rad) and with the tangent plane, as
+// long as it was (Luding 2008).
+fn slip_carried(slip: vec3<f32>, n: vec3<f32>, turn: f32) -> vec3<f32> {
+  let size = length(slip);
+  let turned = slip + cross(n, slip) * turn;
+  let flat = turned - n * dot(turned, n);
+  return flat * min(size / max(length(flat), 1e-30), 4.0);
+}

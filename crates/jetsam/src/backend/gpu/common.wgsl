@@ -43,6 +43,7 @@ struct Constants {
   fields: array<Field, FIELDS>,
   hoses: array<Hose, HOSES>,
   drains: array<Drain, DRAINS>,
+  joined: array<vec4<u32>, JOINED>,     // pairs of bodies that a joint holds together, so that they pass through each other
 }
 
 // As `state::Record`: place and volume, velocity and pressure share.
@@ -80,10 +81,13 @@ struct Body {
   counts: vec4<u32>,      // contacts, deep, first part, parts
 }
 
-struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, slip: vec4<f32>, owner: u32, place: u32, unused: vec2<u32> }
+struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, owner: u32, place: u32, unused: vec2<u32> }
 
 // Of what the force on a body's particle consists.
-struct Touch { fluid: vec4<f32>, contact: vec4<f32>, couple: vec4<f32>, slip: vec4<f32> }
+struct Touch { fluid: vec4<f32>, contact: vec4<f32>, couple: vec4<f32> }
+
+// Slips of the contacts of a slot, as bits; w: slot of the other, GONE behind the last.
+struct Slips { held: array<vec4<u32>, 8> }
 
 // Sums over a part of a body; w: contacts, sharers, deep.
 struct PartSum { force: vec4<f32>, fluid: vec4<f32>, contact: vec4<f32>, torque: vec4<f32>, torque_fluid: vec4<f32>, torque_contact: vec4<f32> }
@@ -175,15 +179,16 @@ struct Sums {
 @group(0) @binding(29) var<storage, read_write> agent_order: array<u32>;
 @group(0) @binding(30) var<storage, read_write> agent_blocks: array<u32>;
 @group(0) @binding(31) var<storage, read_write> crowd: Crowd;
-@group(0) @binding(32) var<storage, read_write> solve: Solve;
-@group(0) @binding(33) var<storage, read_write> swept: array<Swept>;
-@group(0) @binding(34) var<storage, read_write> spot: array<vec4<f32>>;     // sorted: place; w: share of fluids, volume of bodies' particles
-@group(0) @binding(35) var<storage, read_write> flow: array<vec4<f32>>;     // sorted: accelerations by shares, or velocities
-@group(0) @binding(36) var<storage, read_write> nodes: array<Node>;         // fluid
-@group(0) @binding(37) var<storage, read_write> work: array<vec4<f32>>;     // fluid: share found, error, rate, sum of shares over turns
-@group(0) @binding(38) var<storage, read_write> said: array<vec4<f32>>;     // by workgroups of 128 fluid particles
-@group(0) @binding(39) var<storage, read_write> squeezed: array<vec4<f32>>; // force of shares on bodies' particles (N), as touch
-@group(0) @binding(40) var<storage, read_write> joints: array<Joint>;
+@group(0) @binding(32) var<storage, read_write> slips: array<Slips>;        // by slot of rigid bodies; then as found in this step
+@group(0) @binding(33) var<storage, read_write> solve: Solve;
+@group(0) @binding(34) var<storage, read_write> swept: array<Swept>;
+@group(0) @binding(35) var<storage, read_write> spot: array<vec4<f32>>;     // sorted: place; w: share of fluids, volume of bodies' particles
+@group(0) @binding(36) var<storage, read_write> flow: array<vec4<f32>>;     // sorted: accelerations by shares, or velocities
+@group(0) @binding(37) var<storage, read_write> nodes: array<Node>;         // fluid
+@group(0) @binding(38) var<storage, read_write> work: array<vec4<f32>>;     // fluid: share found, error, rate, sum of shares over turns
+@group(0) @binding(39) var<storage, read_write> said: array<vec4<f32>>;     // by workgroups of 128 fluid particles
+@group(0) @binding(40) var<storage, read_write> squeezed: array<vec4<f32>>; // force of shares on bodies' particles (N), as touch
+@group(0) @binding(41) var<storage, read_write> joints: array<Joint>;
 
 // A flock: as flock::FlockConstants, and its clock. lead: place and velocity of its first agent.
 struct Rule {

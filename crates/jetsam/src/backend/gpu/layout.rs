@@ -1,14 +1,14 @@
 //! Rust's side of the structures of `common.wgsl`: constants from a model, bodies and slots to and from a state.
 
-use super::program::{fields, hoses};
+use super::program::{fields, hoses, joined};
 use crate::flock::FlockConstants;
 use crate::integrate::sources::DrainRegion;
 use crate::model::{DtBound, Model};
 use crate::scene::joint::JointModel;
 use crate::scene::{Force, Wall};
-use crate::state::{Body, State};
+use crate::state::{Body, HELD_CONTACTS, State};
 use bytemuck::{Pod, Zeroable};
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DQuat, DVec3};
 
 /// Slots of one part of a body: a workgroup sums them.
 pub const PART: usize = 128;
@@ -102,7 +102,6 @@ pub struct Slot {
     pub offset: V,
     pub normal: V,
     pub facing: V,
-    pub slip: V,
     pub owner: u32,
     pub place: u32,
     pub unused: [u32; 2],
@@ -115,7 +114,13 @@ pub struct Touch {
     pub fluid: V,
     pub contact: V,
     pub couple: V,
-    pub slip: V,
+}
+
+/// Slips of the contacts of a slot, as bits; last the slot of the other.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Slips {
+    pub held: [[u32; 4]; HELD_CONTACTS],
 }
 
 /// Time.
@@ -205,7 +210,6 @@ pub struct Joint {
 /// Joints, in the order of the scene.
 pub fn joints(model: &Model) -> Vec<Joint> {
     let joint = |j: &JointModel| {
-        let apart = j.b.is_some_and(|b| model.contacts[j.a].joined.contains(&(b as u32)));
         let [low, high] = j.limits.unwrap_or_default();
         Joint {
             anchor_a: single(j.anchor[0], 0.0),
@@ -217,7 +221,7 @@ pub fn joints(model: &Model) -> Vec<Joint> {
             turn: j.turn.as_quat().to_array(),
             law: [j.stiffness, j.damping, j.length, model.largest_speed].map(|n| n as f32),
             limits: [low as f32, high as f32, f32::from(j.limits.is_some()), 0.0],
-            who: [j.kind as u32, j.a as u32, j.b.map_or(GONE, |b| b as u32), u32::from(apart)],
+            who: [j.kind as u32, j.a as u32, j.b.map_or(GONE, |b| b as u32), 0],
         }
     };
     model.joints.iter().map(joint).collect()
@@ -361,6 +365,12 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
     if model.drains.is_empty() {
         bytes.extend([0; 48]);
     }
+    for [a, b] in joined(model) {
+        bytes.extend(bytemuck::bytes_of(&[a, b, 0, 0]));
+    }
+    if joined(model).next().is_none() {
+        bytes.extend([0; 16]);
+    }
     bytes
 }
 
@@ -453,7 +463,6 @@ pub fn slots(state: &State, place: impl Fn(usize) -> u32) -> Vec<Slot> {
         offset: single(b.offset[s], b.record[s].volume),
         normal: with(b.normal[s], 0.0),
         facing: with(b.facing[s], 0.0),
-        slip: with(b.slip.get(s).copied().unwrap_or_default(), 0.0),
         owner: b.owner[s],
         place: place(s),
         unused: [0; 2],
@@ -598,16 +607,29 @@ pub fn to_touch(from: &Touch) -> crate::state::Touch {
         fluid: three(from.fluid),
         contact: three(from.contact),
         couple: three(from.couple),
-        slip: three(from.slip),
+        slips: 0,
         contacts: from.contact[3] as u32,
         sharers: from.fluid[3],
         deep: from.couple[3] as u32,
     }
 }
 
-/// A vector of numbers kernels wrote.
-pub fn vec(v: V) -> Vec3 {
-    Vec3::from(three(v))
+/// Slips of contacts there.
+pub fn slips(from: &crate::state::Slips) -> Slips {
+    let held = |k: usize| {
+        let [x, y, z] = from.slip[k].map(f32::to_bits);
+        [x, y, z, from.with[k]]
+    };
+    Slips { held: std::array::from_fn(held) }
+}
+
+/// Slips of contacts home.
+pub fn to_slips(from: &Slips) -> crate::state::Slips {
+    let mut slips = crate::state::Slips::default();
+    for (k, &[x, y, z, with]) in from.held.iter().take_while(|held| held[3] != crate::state::Slips::NONE).enumerate() {
+        (slips.with[k], slips.slip[k]) = (with, [x, y, z].map(f32::from_bits));
+    }
+    slips
 }
 
 #[cfg(test)]
@@ -645,8 +667,9 @@ mod tests {
         }
         same!("Drifted", Drifted, x, v, push, rate, id, owner);
         same!("Birth", Birth, x, v, room);
-        same!("Slot", Slot, offset, normal, facing, slip, owner, place);
-        same!("Touch", Touch, fluid, contact, couple, slip);
+        same!("Slot", Slot, offset, normal, facing, owner, place);
+        same!("Touch", Touch, fluid, contact, couple);
+        same!("Slips", Slips, held);
         same!(
             "Clock",
             Clock,

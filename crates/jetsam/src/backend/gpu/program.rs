@@ -95,6 +95,7 @@ pub fn text(model: &Model) -> String {
         ("IMPLICIT", model.implicit()),
         ("PBF", s.pressure == Pressure::Pbf),
         ("FULL_DAMPING", s.damping == Damping::Full),
+        ("RUBS", model.rubs()),
     ];
     let numbers = [
         ("NORMAL_ONLY", if s.damping == Damping::Normal { 1.0 } else { 0.0 }),
@@ -116,6 +117,8 @@ pub fn text(model: &Model) -> String {
         ("DRAINS", model.drains.len().max(1)),
         ("HAS_DRAINS", model.drains.len()),
         ("NEAREST", model.flocks.iter().map(|f| f.neighbours).max().unwrap_or(0).max(1)),
+        ("JOINED", joined(model).count().max(1)),
+        ("HAS_JOINED", joined(model).count()),
         ("HAS_JOINTS", model.joints.len()),
         ("BY_SOUND", bound_code(DtBound::Sound)),
         ("BY_FORCE", bound_code(DtBound::Force)),
@@ -182,6 +185,12 @@ pub fn fields(model: &Model) -> impl Iterator<Item = &Force> {
 /// The insides of hoses, with the velocity and the fluid of each.
 pub fn hoses(model: &Model) -> impl Iterator<Item = (Bore, DVec3, u32)> {
     model.sources.iter().filter_map(|s| s.bore.map(|bore| (bore, s.velocity, s.fluid)))
+}
+
+/// Pairs of bodies that joints hold together, so that they pass through each other.
+pub fn joined(model: &Model) -> impl Iterator<Item = [u32; 2]> {
+    let apart = |a: usize, b: usize| model.contacts[a].joined.contains(&(b as u32));
+    model.joints.iter().filter_map(move |j| j.b.filter(|&b| apart(j.a, b)).map(|b| [j.a as u32, b as u32]))
 }
 
 /// Whether some fluid has a lifetime.

@@ -2,7 +2,7 @@
 
 use super::layout::{
     self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, GONE, GpuBody, Joint, NODE_BYTES, Rule, SOLVE_BYTES, SWEPT_BYTES,
-    Sizes, Slot, Sums, Touch, three, vec, with,
+    Sizes, Slot, Sums, Touch, three, with,
 };
 use super::program::{hoses, mortal};
 use crate::gpu::{Gpu, GpuError};
@@ -135,6 +135,7 @@ impl Buffers {
             make("order of agents", sizes.agents as usize, 4)?,
             make("blocks of cells of agents", ((sizes.agent_cells + 2).div_ceil(BLOCK)) as usize, 4)?,
             make("flocks", 1, size_of::<Crowd>() + model.flocks.len() * size_of::<Rule>())?,
+            make("slips of contacts", 2 * state.bodies.slips.len(), size_of::<layout::Slips>())?,
             make("implicit pressure", 1, SOLVE_BYTES)?,
             make("bodies under implicit pressure", rounds(sizes.bodies), SWEPT_BYTES)?,
             make("places in rounds", rounds(fluids + rigid), 16)?,
@@ -174,8 +175,9 @@ impl Buffers {
         write(12, 0, bytemuck::cast_slice(&layout::slots(state, place)));
         write(15, 0, bytemuck::cast_slice(parts));
         write(25, 0, bytemuck::cast_slice(&layout::agents(model, state)));
-        write(40, 0, bytemuck::cast_slice(&layout::joints(model)));
+        write(41, 0, bytemuck::cast_slice(&layout::joints(model)));
         write(31, 0, &layout::crowd(model, state, sizes));
+        write(32, 0, bytemuck::cast_slice(&b.slips.iter().map(layout::slips).collect::<Vec<_>>()));
         if !p.carry.is_empty() {
             write(17, 0, bytemuck::cast_slice(&p.carry[..n]));
         }
@@ -237,15 +239,14 @@ impl Buffers {
             let rules: &[Rule] = bytemuck::cast_slice(&crowd[size_of::<Crowd>() / 4..]);
             layout::to_agents(&agents, rules, state);
         }
+        let slips: Vec<layout::Slips> = self.fetch(gpu, &self.all[32], 0, state.bodies.slips.len())?;
         let b = &mut state.bodies;
+        b.slips.iter_mut().zip(&slips).for_each(|(to, from)| *to = layout::to_slips(from));
         for (body, from) in b.body.iter_mut().zip(&bodies) {
             layout::to_body(from, body);
         }
         for (s, slot) in slots.iter().enumerate().take(b.rigid_slots) {
             b.facing[s] = three(slot.facing);
-            if let Some(slip) = b.slip.get_mut(s) {
-                *slip = vec(slot.slip).to_array();
-            }
             if slot.place != GONE {
                 b.record[s] = records[slot.place as usize];
             }
@@ -277,7 +278,7 @@ impl Buffers {
 
     /// What implicit pressure does to bodies.
     pub fn swept(&self) -> &wgpu::Buffer {
-        &self.all[33]
+        &self.all[34]
     }
 
     /// Statistics of steps: the last, then one a step.
