@@ -48,7 +48,12 @@ pub fn validate(args: &Validate) -> miette::Result<Outcome> {
     let count = |v| all().filter(|r| r.verdict == v).count();
     let (ok, fail) = (count(Verdict::Ok), count(Verdict::Fail));
     let seconds: f64 = reports.iter().map(Report::seconds).sum();
-    say(&format!("{ok} of {} expectations met in {} cases, {}", ok + fail, reports.len(), terminal::seconds(seconds)));
+    let not_here = match count(Verdict::NotHere) {
+        0 => String::new(),
+        n => format!("; {n} cannot be judged, as their scenes do not run on this backend"),
+    };
+    let (all, cases) = (ok + fail, reports.len());
+    say(&format!("{ok} of {all} expectations met in {cases} cases, {}{not_here}", terminal::seconds(seconds)));
     Ok(if fail == 0 { Outcome::Fine } else { Outcome::WentWrong })
 }
 

@@ -472,13 +472,23 @@ impl Model {
         self.solver.courant_flow.unwrap_or(if self.solver.pressure == Pressure::Pbf { 1.0 } else { 0.6 })
     }
 
+    /// How far the fastest particle gets in a step of implicit pressure (m), and the factor by which [`Ledger::pressed`] counts as a
+    /// speed (E29).
+    pub(crate) fn bounds_of_flow(&self) -> [f64; 2] {
+        let pressed = if self.solver.pressure == Pressure::Dfsph { self.courant_flow() / SWING } else { 0.0 };
+        [self.courant_flow() * self.spacing, pressed]
+    }
+
+    /// The longest step of implicit pressure (s).
+    pub(crate) fn longest_step(&self) -> f64 {
+        let longest = if self.solver.pressure == Pressure::Pbf { 1.0 / 120.0 } else { 1.0 / 200.0 };
+        self.solver.longest_dt.unwrap_or(longest)
+    }
+
     /// The speed by which steps are bound (m/s): that of the fastest particle. With DFSPH, which holds the directions of pairs for
     /// a step, also that with which pressed particles swing about their places: `dt sqrt(p / rho) <= 0.35 dx`.
     pub fn bounding_speed(&self, ledger: &Ledger) -> f64 {
-        match self.solver.pressure {
-            Pressure::Dfsph => ledger.speed.max(self.courant_flow() / SWING * ledger.pressed),
-            _ => ledger.speed,
-        }
+        ledger.speed.max(self.bounds_of_flow()[1] * ledger.pressed)
     }
 
     /// Largest time step allowed now and what bounds it (E29), from the largest speed (m/s) and acceleration (m/s^2).
@@ -491,13 +501,12 @@ impl Model {
             None => (f64::INFINITY, DtBound::Frame),
         };
         if self.implicit() {
-            let longest = if s.pressure == Pressure::Pbf { 1.0 / 120.0 } else { 1.0 / 200.0 };
-            let longest = s.longest_dt.unwrap_or(longest);
+            let longest = self.longest_step();
             if longest < best.0 {
                 best = (longest, DtBound::Longest);
             }
             // so far the fastest gets in a step, by what it has and what pulls it
-            let way = self.courant_flow() * self.spacing;
+            let [way, _] = self.bounds_of_flow();
             let flow = 2.0 * way / (speed + (speed * speed + 4.0 * acceleration * way).sqrt());
             if flow < best.0 {
                 best = (flow, DtBound::Flow);

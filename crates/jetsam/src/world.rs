@@ -218,7 +218,7 @@ impl World {
             return None; // the hand is felt step by step
         }
         let Batch { steps, stages } = self.backend.queue(&self.model, request)?;
-        Stage::WCSPH.into_iter().zip(stages).for_each(|(stage, time)| self.timers[stage as usize] += time);
+        self.order().iter().zip(stages).for_each(|(stage, time)| self.timers[*stage as usize] += time);
         let end = self.time + longest;
         let mut last = None;
         for (dt, bound, ledger) in steps {

@@ -144,6 +144,7 @@ impl Backend for Cpu {
             particle_mass: bodies.body.iter().map(mass).collect(),
             next_id: p.next_id(),
             body_radius: bodies.body.iter().map(far).collect(),
+            implicit: Implicit::of(bodies.body.len()),
             state,
             ..Self::default()
         };

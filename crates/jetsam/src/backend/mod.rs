@@ -91,8 +91,8 @@ pub struct Request {
 pub struct Batch {
     /// Length (s), what bounded it, and what it left behind, step by step.
     pub steps: Vec<(f64, DtBound, Ledger)>,
-    /// Time on the device by stage.
-    pub stages: [Duration; Stage::WCSPH.len()],
+    /// Time on the device by stage, in the order of a step.
+    pub stages: Vec<Duration>,
 }
 
 /// Which backend a world runs on.

@@ -89,13 +89,16 @@ fn school_with(s: ptr<function, Perceived>, rule: Rule, v: vec3<f32>, other: vec
   }
 }
 
+// What a flock is to another.
+fn relation_to(rule: Rule, f: u32) -> u32 { return (rule.relations[f / 16u] >> (2u * (f % 16u))) & 3u; }
+
 fn perceive(i: u32, own: u32) -> Perceived {
   let rule = crowd.rules[own];
   let x = agents[i].x.xyz;
   let v = agents[i].v.xyz;
   var s = Perceived();
   for (var f = 0u; f < crowd.number.y; f += 1u) {
-    let relation = (rule.kind.w >> (2u * f)) & 3u;
+    let relation = relation_to(rule, f);
     if (relation == 1u || (relation == SCHOOL && rule.count.z > 0u)) { continue; }
     let reach = select(rule.sense.x, rule.radii.w, relation == SCHOOL);
     var near = agent_region(x, reach, f);
@@ -116,13 +119,12 @@ fn perceive(i: u32, own: u32) -> Perceived {
 }
 
 // E25: the nearest few of those schooled with, however far; ties go to the lower id.
-const MOST: u32 = 16u;
 fn add_nearest(s: ptr<function, Perceived>, i: u32, rule: Rule) {
   let x = agents[i].x.xyz;
   let v = agents[i].v.xyz;
-  let k = min(rule.count.z, MOST);
-  var r_sqs = array<f32, MOST>();
-  var whos = array<u32, MOST>();
+  let k = min(rule.count.z, NEAREST);
+  var r_sqs = array<f32, NEAREST>();
+  var whos = array<u32, NEAREST>();
   var found = 0u;
   // radii doubled until as many are inside: all who are nearer are then known
   var reach = 1.5 * crowd.per_cell.w;
@@ -130,7 +132,7 @@ fn add_nearest(s: ptr<function, Perceived>, i: u32, rule: Rule) {
     found = 0u;
     var all = 0u;
     for (var f = 0u; f < crowd.number.y; f += 1u) {
-      if (((rule.kind.w >> (2u * f)) & 3u) != SCHOOL) { continue; }
+      if (relation_to(rule, f) != SCHOOL) { continue; }
       all += crowd.rules[f].kind.z;
       var near = agent_region(x, reach, f);
       while (agent_region_next(&near)) {

@@ -6,37 +6,68 @@ fn spin(b: Body, q: vec4<f32>, l: vec3<f32>) -> vec3<f32> {
   return turn(q, b.inertia_x.xyz * own.x + b.inertia_y.xyz * own.y + b.inertia_z.xyz * own.z);
 }
 
+// Whether bodies make a part of a step now.
+fn moving() -> bool { return clock.running != 0u && clock.idle == 0u; }
+// The bodies that take part in it: all at a step's end.
+fn movers() -> u32 { return select(m.count.w, m.movers.x, clock.mid != 0u); }
+fn moves(b: Body) -> bool { return b.x.w > 0.0; }
+fn first_kick() -> f32 { return select(clock.part, 0.5 * clock.part, LEAPFROG); }
+
+// E20: half a kick.
+fn half_kicked(b: Body) -> Body {
+  var now = b;
+  let p = kept(b.p.xyz, b.p_rest.xyz, first_kick() * b.force.xyz);
+  let l = kept(b.l.xyz, b.l_rest.xyz, first_kick() * b.torque.xyz);
+  now.p_half = vec4<f32>(p.sum, 0.0);
+  now.p_rest = vec4<f32>(p.rest, 0.0);
+  now.l_half = vec4<f32>(l.sum, 0.0);
+  now.l_rest = vec4<f32>(l.rest, 0.0);
+  return now;
+}
 @compute @workgroup_size(64)
-fn drift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+fn half_kick_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let k = number(g, n, l, 64u);
-  if (clock.running == 0u || k >= m.count.w || clock.drag > 0.0) { return; }
-  var b = bodies[k];
-  if (b.x.w == 0.0) { return; }
-  let dt = clock.dt;
-  let kick = select(dt, 0.5 * dt, LEAPFROG);
-  let a = b.force.xyz * b.x.w;
-  let kicked_v = kept(b.v.xyz, b.v_rest.xyz, kick * a);
-  let kicked_l = kept(b.l.xyz, b.l_rest.xyz, kick * b.torque.xyz);
-  let v_half = kicked_v.sum;
-  let l_half = kicked_l.sum;
-  let moved_x = kept(b.x.xyz, b.rest.xyz, dt * v_half);
-  // a free turn with constant angular momentum: implicit midpoint rule
+  if (!moving() || k >= movers() || clock.drag > 0.0 || !moves(bodies[k])) { return; }
+  let b = half_kicked(bodies[k]);
+  bodies[k].p_half = b.p_half;
+  bodies[k].p_rest = b.p_rest;
+  bodies[k].l_half = b.l_half;
+  bodies[k].l_rest = b.l_rest;
+}
+
+// Orientation after a free turn with constant angular momentum: implicit midpoint rule.
+fn turned_body(b: Body, l_half: vec3<f32>, dt: f32) -> vec4<f32> {
   var middle = b.q;
   for (var round = 0; round < 6; round += 1) {
     middle = times(turned_by(0.5 * dt * spin(b, middle, l_half)), b.q);
   }
-  let q = normalize(times(turned_by(dt * spin(b, middle, l_half)), b.q));
-  let now = l_half + (dt - kick) * b.torque.xyz;
+  return normalize(times(turned_by(dt * spin(b, middle, l_half)), b.q));
+}
+
+@compute @workgroup_size(64)
+fn drift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let k = number(g, n, l, 64u);
+  if (!moving() || k >= movers() || clock.drag > 0.0 || !moves(bodies[k])) { return; }
+  var b = bodies[k];
+  if (HAS_JOINTS == 0u) { b = half_kicked(b); }   // else joints have corrected it meanwhile
+  let dt = clock.part;
+  let rest = dt - first_kick();
+  let moved_x = kept(b.x.xyz, b.rest.xyz, dt * b.p_half.xyz / b.rest.w);
+  let q = turned_body(b, b.l_half.xyz, dt);
+  let now = b.l_half.xyz + rest * b.torque.xyz;
   bodies[k].x = vec4<f32>(home_all(moved_x.sum), b.x.w);
   bodies[k].rest = vec4<f32>(moved_x.rest, b.rest.w);
   bodies[k].q = q;
-  bodies[k].v_rest = vec4<f32>(kicked_v.rest, 0.0);
-  bodies[k].l_rest = vec4<f32>(kicked_l.rest, 0.0);
-  bodies[k].v_half = vec4<f32>(v_half, 0.0);
-  bodies[k].l_half = vec4<f32>(l_half, 0.0);
-  bodies[k].v = vec4<f32>(v_half + (dt - kick) * a, 0.0);
+  bodies[k].p_rest = b.p_rest;
+  bodies[k].l_rest = b.l_rest;
+  bodies[k].p_half = b.p_half;
+  bodies[k].l_half = b.l_half;
+  let p = b.p_half.xyz + rest * b.force.xyz;
+  bodies[k].p = vec4<f32>(p, 0.0);
+  bodies[k].v = vec4<f32>(p / b.rest.w, 0.0);
   bodies[k].l = vec4<f32>(now, 0.0);
   bodies[k].omega = vec4<f32>(spin(b, q, now), 0.0);
+  if (IMPLICIT) { swept[k].impulse += first_kick() * swept[k].outside; }
 }
 
 const PART: u32 = 128u;
@@ -62,7 +93,7 @@ fn take_slips(s: u32, inside: bool) {
 fn sum_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let k = g.y * n.x + g.x;
   var own = PartSum();
-  if (k < m.more.x && clock.running != 0u) {
+  if (k < m.more.x && moving()) {
     let part = parts[k];
     let s = part.first + l;
     if (s < part.end) {
@@ -87,13 +118,13 @@ fn sum_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: ve
     if (l < reach) { tree[l] = plus(tree[l], tree[l + reach]); }
     workgroupBarrier();
   }
-  if (l == 0u && k < m.more.x && clock.running != 0u) { part_sums[k] = tree[0]; }
+  if (l == 0u && k < m.more.x && moving()) { part_sums[k] = tree[0]; }
 }
 
 @compute @workgroup_size(64)
 fn sum_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let k = number(g, n, l, 64u);
-  if (clock.running == 0u || k >= m.count.w) { return; }
+  if (!moving() || k >= movers()) { return; }
   let b = bodies[k];
   var s = PartSum();
   for (var p = b.counts.z; p < b.counts.z + b.counts.w; p += 1u) { s = plus(s, part_sums[p]); }
@@ -108,12 +139,12 @@ fn sum_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
     force -= s.fluid.xyz;
     torque -= s.torque_fluid.xyz;
   }
-  let moves = b.x.w > 0.0;
-  if (moves) { force += b.rest.w * clock.gravity.xyz; }
+  let pushed = moves(b);
+  if (pushed) { force += b.rest.w * clock.gravity.xyz; }
   let contacts = u32(s.force.w);
-  let far = contacts > 0u && length(b.v.xyz) * clock.dt > 0.5 * m.period.w;
-  let deep = moves && (s.contact.w > 0.0 || far);
-  bodies[k].force = vec4<f32>(force, select(0.0, s.fluid.w, moves));
+  let far = contacts > 0u && length(b.v.xyz) * clock.part > 0.5 * m.period.w;
+  let deep = pushed && (s.contact.w > 0.0 || far);
+  bodies[k].force = vec4<f32>(force, select(0.0, s.fluid.w, pushed));
   bodies[k].torque = vec4<f32>(torque, 0.0);
   bodies[k].force_fluid = vec4<f32>(s.fluid.xyz, 0.0);
   bodies[k].force_contact = vec4<f32>(s.contact.xyz, 0.0);
@@ -124,18 +155,22 @@ fn sum_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
   bodies[k].counts = vec4<u32>(contacts, select(0u, 1u, deep) | select(0u, 2u, fresh), b.counts.z, b.counts.w);
 }
 
+// E20: the kick that ends a step.
 @compute @workgroup_size(64)
 fn kick_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let k = number(g, n, l, 64u);
-  if (clock.running == 0u || k >= m.count.w || clock.drag > 0.0 || !LEAPFROG) { return; }
+  if (clock.running == 0u || k >= m.count.w || clock.drag > 0.0 || !moves(bodies[k])) { return; }
+  kick_body(k, bodies[k].force.xyz, bodies[k].torque.xyz);
+}
+fn kick_body(k: u32, force: vec3<f32>, torque: vec3<f32>) {
+  if (!LEAPFROG) { return; }
   let b = bodies[k];
-  if (b.x.w == 0.0) { return; }
-  let v = kept(b.v_half.xyz, b.v_rest.xyz, 0.5 * clock.dt * b.x.w * b.force.xyz);
-  let l_now = kept(b.l_half.xyz, b.l_rest.xyz, 0.5 * clock.dt * b.torque.xyz);
-  let now = l_now.sum;
-  bodies[k].v_rest = vec4<f32>(v.rest, 0.0);
-  bodies[k].l_rest = vec4<f32>(l_now.rest, 0.0);
-  bodies[k].v = vec4<f32>(v.sum, 0.0);
-  bodies[k].l = vec4<f32>(now, 0.0);
-  bodies[k].omega = vec4<f32>(spin(b, b.q, now), 0.0);
+  let p = kept(b.p_half.xyz, b.p_rest.xyz, 0.5 * clock.part * force);
+  let l = kept(b.l_half.xyz, b.l_rest.xyz, 0.5 * clock.part * torque);
+  bodies[k].p_rest = vec4<f32>(p.rest, 0.0);
+  bodies[k].l_rest = vec4<f32>(l.rest, 0.0);
+  bodies[k].p = vec4<f32>(p.sum, 0.0);
+  bodies[k].v = vec4<f32>(p.sum / b.rest.w, 0.0);
+  bodies[k].l = vec4<f32>(l.sum, 0.0);
+  bodies[k].omega = vec4<f32>(spin(b, b.q, l.sum), 0.0);
 }

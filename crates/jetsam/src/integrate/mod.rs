@@ -37,6 +37,12 @@ impl Advance {
         self.dt / f64::from(self.parts.max(1))
     }
 
+    /// Part `k` of the step, as a step.
+    pub fn nth_part(&self, k: u32) -> Self {
+        let dt = self.part();
+        Self { time: self.time + f64::from(k) * dt, dt, dt_before: dt, drag: self.drag, parts: 1 }
+    }
+
     /// Time at the end of the step (s).
     pub fn end(&self) -> f64 {
         self.time + self.dt

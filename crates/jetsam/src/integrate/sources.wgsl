@@ -103,20 +103,22 @@ fn drain(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u
 
 // Particles inside hoses go on at the hose's speed: what pushes them is taken away.
 @compute @workgroup_size(128)
-fn hold(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+fn hold_hoses(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let i = number(g, n, l, 128u);
   if (clock.running == 0u || i >= live_fluid()) { return; }
   let x = records[i].x.xyz;
   let owner = info[i].y;
   var force = vec3<f32>(0.0);
+  var impulse = vec3<f32>(0.0);
   for (var k = 0u; k < HAS_HOSES; k += 1u) {
     let h = m.hoses[k];
     if (u32(h.velocity.w) != owner || !inside(x, h.start, h.axis)) { continue; }
     force -= m.fluids[owner].mass * push[i].xyz;
+    impulse += m.fluids[owner].mass * (h.velocity.xyz - records[i].v.xyz);
     push[i] = vec4<f32>(0.0, 0.0, 0.0, push[i].w);
     before[i] = vec4<f32>(0.0, 0.0, 0.0, before[i].w);
     records[i].v = vec4<f32>(h.velocity.xyz, records[i].v.w);
     if (CARRIED) { carry[i] = vec4<f32>(0.0); }
   }
-  held[i] = vec4<f32>(force, 0.0);
+  held[i] = Hold(vec4<f32>(force, 0.0), vec4<f32>(impulse, 0.0));
 }

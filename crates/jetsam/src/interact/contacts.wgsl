@@ -54,12 +54,21 @@ fn rub(felt: ptr<function, Felt>, a: Body, b: Body, pair: vec2<u32>, k: f32, par
   let number = max(max(a.law.y, b.law.y), counted);
   let k_t = TANGENTIAL * k;
   let eta_t = part * dashpot(TANGENTIAL_DAMPING, k_t / part * number, mass) / number;
-  let turn = 0.5 * clock.dt * dot(a.omega.xyz + b.omega.xyz, n);
-  let slip = slip_carried(slip_between(pair.x, pair.y), n, turn) + v * clock.dt;
+  let turn = 0.5 * clock.part * dot(a.omega.xyz + b.omega.xyz, n);
+  let slip = slip_carried(slip_between(pair.x, pair.y), n, turn) + v * clock.part;
   let limit = mu * load;
   let held = friction(k_t * slip, limit);
   if (pair.x < pair.y && k_t > 0.0) { keep(felt, pair.x, pair.y, held / k_t, load); }
   return friction(held + eta_t * v, limit);
+}
+
+// Whether two bodies pass through each other, as a joint holds them together.
+fn joined(a: u32, b: u32) -> bool {
+  for (var k = 0u; k < HAS_JOINED; k += 1u) {
+    let pair = m.joined[k];
+    if ((pair.x == a && pair.y == b) || (pair.x == b && pair.y == a)) { return true; }
+  }
+  return false;
 }
 
 fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kind: u32) {
@@ -70,15 +79,16 @@ fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kin
   let own_slot = info[i].x;
   let a = bodies[owner];
   if (kind == STATIC && a.x.w == 0.0) { return; }
-  var near = walk(x, kind);
-  while (next(&near)) {
+  // particles of bodies may have gone on since they were sorted
+  var near = region(x, sqrt(reach_sq) + clock.stray, kind);
+  while (region_next(&near)) {
     let j = near.at;
     let body = info[j].y;
     let d = wrap(records[j].x.xyz - x);
     let r_sq = dot(d, d);
     if (r_sq >= reach_sq || body == owner) { continue; }
     let inverse_mass = a.x.w + bodies[body].x.w;
-    if (inverse_mass == 0.0) { continue; }
+    if (inverse_mass == 0.0 || joined(owner, body)) { continue; }
     let b = bodies[body];
     let r = sqrt(r_sq);
     let other_slot = info[j].x;
@@ -108,13 +118,13 @@ fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kin
     if (a.x.w == 0.0) { ln_e = b.law.x; } else if (b.x.w == 0.0) { ln_e = a.law.x; }
     let mass = 1.0 / inverse_mass;
     let k = contact_constants(mass, ln_e, max(a.law.y, b.law.y), counted, max(a.stated.x, b.stated.x), max(a.stated.y, b.stated.y));
-    var f = part * contact_force(along, v, s, diameter, k.x, k.y, NORMAL_ONLY, clock.dt);
+    var f = part * contact_force(along, v, s, diameter, k.x, k.y, NORMAL_ONLY, clock.part);
     let speed = dot(v, n);
     let overlap = diameter - s;
     let held = max(counted, 1.0) * k.x * (diameter * diameter - overlap * overlap);
     if (overlap > DEEP * diameter && speed < 0.0 && mass * speed * speed > HELD * held) {
       // taken within a step if as many contacts as a face has particles share it
-      let stop = select(0.0, mass / (clock.dt * max(a.law.z, b.law.z)), clock.dt > 0.0);
+      let stop = select(0.0, mass / (clock.part * max(a.law.z, b.law.z)), clock.part > 0.0);
       f += n * (speed * part * stop);
       (*felt).deep += 1.0;
     }

@@ -7,7 +7,11 @@ struct Terms { mu_sum: f32, eta: f32, same: f32, cohesion: f32, curvature: f32 }
 // One pair. `seen`: relative velocity that viscosity sees.
 struct Pair { volume: f32, share: f32, other_share: f32, other_volume: f32, d: vec3<f32>, r_sq: f32, v: vec3<f32>, seen: vec3<f32> }
 
-fn cut(share: f32) -> f32 { return select(max(share, 0.0), share, NEGATIVE); }
+// Implicit pressure has pushed already.
+fn cut(share: f32) -> f32 {
+  if (IMPLICIT) { return 0.0; }
+  return select(max(share, 0.0), share, NEGATIVE);
+}
 
 // E4 and E5; returns G.
 fn add_pair(sum: ptr<function, Pairs>, p: Pair, t: Terms) -> f32 {
@@ -44,12 +48,12 @@ fn add_carry(sum: ptr<function, Pairs>, p: Pair, G: f32, among_fluids: bool) {
 }
 
 // Springs between a particle of a fluid and one of a body (E16).
-fn springs(kind: u32, fluid_share: f32) -> bool { return (kind == RIGID && !COUPLED_BY_PRESSURE) || fluid_share <= 0.0; }
+fn springs(kind: u32, fluid_share: f32) -> bool { return (kind == RIGID && !COUPLED_BY_PRESSURE) || (fluid_share <= 0.0 && !IMPLICIT); }
 fn spring(d: vec3<f32>, v: vec3<f32>, r_sq: f32, fluid: u32, body: u32) -> vec3<f32> {
   let diameter = m.period.w;
   if (r_sq >= REACH * REACH * diameter * diameter) { return vec3<f32>(0.0); }
   let k = coupling_pair(m.fluids[fluid].mass, body);
-  return contact_force(d, v, sqrt(r_sq), diameter, k.x, k.y, NORMAL_ONLY, clock.dt);
+  return contact_force(d, v, sqrt(r_sq), diameter, k.x, k.y, NORMAL_ONLY, clock.part);
 }
 
 @compute @workgroup_size(128)
@@ -162,16 +166,31 @@ fn forces_body(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
     }
     if (springs(kind, other.v.w)) { pushed += spring(d, v, r_sq, fluid, owner); }
   }
-  let by_fluid = sum.force + pushed;
+  felt_by(i, k, sum.force + pushed);
+}
+
+// What a body's particle feels by fluids, and by contacts as bodies are now.
+fn felt_by(i: u32, k: u32, by_fluid: vec3<f32>) {
+  let x = records[i].x.xyz;
+  let owner = info[i].y;
   var felt = Felt();
   add_contacts(&felt, i, x, owner, RIGID);
   add_contacts(&felt, i, x, owner, STATIC);
   var force = by_fluid + felt.force;
   if (RUBS && k < m.count.y && felt.held < 8u) { slips[m.count.y + info[i].x].held[felt.held].w = GONE; }
   if (bodies[owner].x.w > 0.0) {
-    force += bodies[owner].stated.z * fields_at(x, own.v.xyz);
+    force += bodies[owner].stated.z * fields_at(x, records[i].v.xyz);
   }
   push[i] = vec4<f32>(force, 0.0);
   touch[k] = Touch(vec4<f32>(by_fluid, felt.sharers), vec4<f32>(felt.force, felt.contacts),
                    vec4<f32>(felt.couple, felt.deep));
+}
+
+// Contacts of bodies alone, in a part of a step of implicit pressure.
+@compute @workgroup_size(128)
+fn touch_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let k = number(g, n, l, 128u);
+  let i = m.count.x + k;
+  if (!moving() || i >= rigid_end()) { return; }
+  felt_by(i, k, vec3<f32>(0.0));
 }

@@ -17,6 +17,7 @@ pub use report::{Report, Row, Verdict, markdown, short};
 use crate::backend::Choice;
 use crate::error::Result;
 use crate::formula::Scope;
+use crate::gpu::GpuError;
 use crate::probe::{Probes, Sampler, Series};
 use crate::scene::{Expect, Scene, Source};
 use crate::world::World;
@@ -38,6 +39,8 @@ pub struct Run {
     pub particles: usize,
     /// What went wrong, if anything.
     pub trouble: Option<String>,
+    /// Whether the backend asked for can run the scene at all; else `trouble` says why not.
+    pub ran: bool,
 }
 
 /// A probe's readings along its line at one time.
@@ -154,9 +157,18 @@ fn simulate(variant: &Variant, backend: Choice, progress: &mut dyn FnMut(f64)) -
     let mut world = match World::choose(backend, scene.assemble()?) {
         Ok((world, _)) => world,
         Err(why) => {
-            let trouble = Some(format!("not run: {why}"));
+            let ran = !matches!(why, GpuError::Scene { .. } | GpuError::Limit { .. });
+            let trouble = Some(if ran { format!("not run: {why}") } else { why.to_string() });
             let (series, profiles) = (vec![Series::default(); scene.probe.len()], Vec::new());
-            return Ok(Run { variant: variant.name.clone(), series, profiles, seconds: 0.0, particles: 0, trouble });
+            return Ok(Run {
+                variant: variant.name.clone(),
+                series,
+                profiles,
+                seconds: 0.0,
+                particles: 0,
+                trouble,
+                ran,
+            });
         }
     };
     let mut sampler = Sampler::new(scene, &world)?;
@@ -203,6 +215,7 @@ fn simulate(variant: &Variant, backend: Choice, progress: &mut dyn FnMut(f64)) -
         seconds,
         particles,
         trouble: wrong,
+        ran: true,
     })
 }
 
@@ -227,7 +240,7 @@ fn rows(name: &str, base: &Scene, variants: &[Variant], runs: &[Run]) -> Result<
         for (path, e) in expectations(&v.scene, &v.name) {
             let judge = Judge::new(&v.scene, &v.scope, &path, e)?;
             let reached = judge.reached(run);
-            rows.push(Row::new(name, &v.name, &judge, reached.number, reached.note, run.seconds));
+            rows.push(Row::new(name, &v.name, &judge, reached.number, reached.note, run.seconds, run.ran));
         }
     }
     let scope = Scope::of(base)?;
@@ -235,7 +248,7 @@ fn rows(name: &str, base: &Scene, variants: &[Variant], runs: &[Run]) -> Result<
         let Some(compare) = &e.compare else { continue };
         let path = format!("expect.{i}");
         let overall = Judge::new(base, &scope, &path, e)?;
-        let (mut numbers, mut notes, mut seconds) = (Vec::new(), Vec::new(), 0.0);
+        let (mut numbers, mut notes, mut seconds, mut ran) = (Vec::new(), Vec::new(), 0.0, true);
         for wanted in &compare.of {
             let k = variants.iter().position(|v| v.name == *wanted).unwrap_or(0);
             let judge = Judge::new(&variants[k].scene, &variants[k].scope, &path, &variants[k].scene.expect[i])?;
@@ -243,9 +256,10 @@ fn rows(name: &str, base: &Scene, variants: &[Variant], runs: &[Run]) -> Result<
             notes.push(format!("{wanted}: {}", short(reached.number)));
             numbers.push(reached.number);
             seconds += runs[k].seconds;
+            ran &= runs[k].ran;
         }
         let number = overall.compared(compare.by, &numbers);
-        rows.push(Row::new(name, "", &overall, number, notes.join(", "), seconds));
+        rows.push(Row::new(name, "", &overall, number, notes.join(", "), seconds, ran));
     }
     Ok(rows)
 }

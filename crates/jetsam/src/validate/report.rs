@@ -63,6 +63,9 @@ pub enum Verdict {
     Fail,
     /// It is only reported.
     Info,
+    /// The scene cannot run on the backend that was asked for.
+    #[serde(rename = "not here")]
+    NotHere,
 }
 
 impl Verdict {
@@ -72,14 +75,25 @@ impl Verdict {
             Verdict::Ok => "ok",
             Verdict::Fail => "FAIL",
             Verdict::Info => "info",
+            Verdict::NotHere => "cannot run here",
         }
     }
 }
 
 impl Row {
-    pub(super) fn new(case: &str, variant: &str, judge: &Judge, number: f64, note: String, seconds: f64) -> Self {
+    /// `ran`: whether the runs behind it could be made.
+    pub(super) fn new(
+        case: &str,
+        variant: &str,
+        judge: &Judge,
+        number: f64,
+        note: String,
+        seconds: f64,
+        ran: bool,
+    ) -> Self {
         let (reference, tolerance) = judge.expected();
         let verdict = match (judge.expect.gate, judge.holds(number)) {
+            _ if !ran => Verdict::NotHere,
             (false, _) => Verdict::Info,
             (true, true) => Verdict::Ok,
             (true, false) => Verdict::Fail,
@@ -138,7 +152,13 @@ pub fn markdown(reports: &[Report], how: &str) -> String {
     for r in reports {
         let count = |v| r.rows.iter().filter(|row| row.verdict == v).count();
         let (ok, fail, info) = (count(Verdict::Ok), count(Verdict::Fail), count(Verdict::Info));
-        let met = if fail == 0 { format!("{ok} of {ok}") } else { format!("**{ok} of {}**", ok + fail) };
+        let met = if ok + fail + info == 0 {
+            Verdict::NotHere.word().into()
+        } else if fail == 0 {
+            format!("{ok} of {ok}")
+        } else {
+            format!("**{ok} of {}**", ok + fail)
+        };
         let link = anchor(&r.name);
         writeln!(text, "| [{}](#{link}) | {} | {met} | {info} | {:.1} |", r.name, r.title, r.seconds()).expect(line);
     }

@@ -4,6 +4,7 @@
 
 pub mod oracle;
 
+use jetsam::assemble::Assembly;
 use jetsam::scene::Source;
 use jetsam::state::Kind;
 use jetsam::{Scene, World, random};
@@ -29,6 +30,11 @@ pub fn space(half: f64, spacing: f64, dt: f64) -> String {
 
 /// A periodic box of stirred fluid with two bodies in it; `solver` are keys of `[solver]`, without gravity.
 pub fn stirred(dimensions: u32, solver: &str) -> World {
+    World::new(stirred_assembly(dimensions, solver))
+}
+
+/// The same, to be run by any backend.
+pub fn stirred_assembly(dimensions: u32, solver: &str) -> Assembly {
     let text = format!(
         "[world]\ndimensions = {dimensions}\ngravity = [0, 0, 0]\n[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 1]\n\
          walls = [\"periodic\", \"periodic\", \"periodic\"]\n[resolution]\nspacing = 0.0625\n\
@@ -46,5 +52,5 @@ pub fn stirred(dimensions: u32, solver: &str) -> World {
             r.v[a] = (2.0 * random::uniform(3, a as u64, i as u64) - 1.0) as f32;
         }
     }
-    World::new(assembly)
+    assembly
 }

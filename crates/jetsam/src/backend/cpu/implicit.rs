@@ -53,6 +53,13 @@ pub(super) struct Implicit {
     pub(super) divergence: Solve,
 }
 
+impl Implicit {
+    /// Of a state with so many bodies, in which no step was made.
+    pub(super) fn of(bodies: usize) -> Self {
+        Self { added: vec![[DVec3::ZERO; 2]; bodies], ..Self::default() }
+    }
+}
+
 /// What one solve is about.
 #[derive(Clone, Copy, PartialEq)]
 enum Aim {

@@ -73,7 +73,9 @@ impl Cpu {
         if advance.drag == 0.0 && advance.dt > 0.0 {
             self.end_part(model, Self::part(advance, advance.parts - 1), outside, true);
         } else {
+            // nothing is in the forces but what was summed
             self.outside_bodies = outside;
+            self.implicit.added.fill([DVec3::ZERO; 2]);
         }
     }
 

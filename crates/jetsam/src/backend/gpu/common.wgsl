@@ -16,6 +16,8 @@ struct Hose { start: vec4<f32>, axis: vec4<f32>, velocity: vec4<f32> }
 struct Drain { low: vec4<f32>, high: vec4<f32>, begin: f32, end: f32, kind: u32, unused: u32 }
 // A particle to be born. x.w: when (s since the frame began); v.w: number of the fluid, negative less one inside a hose.
 struct Birth { x: vec4<f32>, v: vec4<f32>, room: vec4<u32> }
+// What holds a fluid particle inside a hose: force (N), and impulse for what implicit pressure had done already (N s).
+struct Hold { force: vec4<f32>, impulse: vec4<f32> }
 
 struct Constants {
   lower: vec4<f32>,       // where particles may be (m); w: spacing (m)
@@ -25,18 +27,23 @@ struct Constants {
   period: vec4<f32>,      // length of periodic axes (m), 0 for others; w: contact diameter (m)
   gravity: vec4<f32>,     // without shaking (m/s^2); w: speed of sound (m/s)
   corner: vec4<f32>,      // where potential energy is zero (m); w: neighbours of a full support
-  far_corner: vec4<f32>,  // the other end of the domain (m)
+  far_corner: vec4<f32>,  // the other end of the domain (m); w: longest step of implicit pressure (s)
   kernel: vec4<f32>,      // factors of W, of G; W at one spacing, W at no distance
   tune: vec4<f32>,        // factor of the Laplacian; softening (m^2); XSPH; shifting
-  contact: vec4<f32>,     // square of the rate (1/s^2) that makes springs of masses; vorticity times spacing (m); 1
-  step: vec4<f32>,        // courant, courant_force, bound that does not change (s), stated dt (s) or 0
+  contact: vec4<f32>,     // square of the rate (1/s^2) that makes springs of masses; vorticity times spacing (m); 1;
+                          // pressure up to which gravity fades out between fluids and bodies (Pa)
+  step: vec4<f32>,        // courant, courant_force (implicit pressure: way of a step (m), factor of `pressed`), bound that does not
+                          // change (s), stated dt (s) or 0
+  rounds: vec4<f32>,      // implicit pressure: tolerances of places and of velocities, most rounds, dt of contacts (s)
   cells: vec4<u32>,       // cells on each axis; w: their number
   count: vec4<u32>,       // capacity of fluids, slots of rigid bodies, slots of all bodies, bodies
   more: vec4<u32>,        // parts of bodies, blocks of the scan, groups of the ledger, axes that are open (bits)
+  movers: vec4<u32>,      // bodies that have rigid slots, joints
   fluids: array<Fluid, FLUIDS>,
   fields: array<Field, FIELDS>,
   hoses: array<Hose, HOSES>,
   drains: array<Drain, DRAINS>,
+  joined: array<vec4<u32>, JOINED>,     // pairs of bodies that a joint holds together, so that they pass through each other
 }
 
 // As `state::Record`: place and volume, velocity and pressure share.
@@ -54,10 +61,11 @@ struct Body {
   omega: vec4<f32>,
   acceleration: vec4<f32>,            // of scripts, else 0
   angular_acceleration: vec4<f32>,
-  v_half: vec4<f32>,
+  p: vec4<f32>,           // momentum: sums of what bodies exchange cancel to the last bit
+  p_half: vec4<f32>,
   l: vec4<f32>,
   l_half: vec4<f32>,
-  v_rest: vec4<f32>,      // what rounding left over of v and l
+  p_rest: vec4<f32>,      // what rounding left over of both
   l_rest: vec4<f32>,
   inertia_x: vec4<f32>,   // columns of the inverse inertia in the body's axes
   inertia_y: vec4<f32>,
@@ -98,6 +106,29 @@ struct Clock {
   births: u32, born: u32,  // births behind us in the list, and particles ever born from it
   listed: u32, next_id: u32,
   crossed: vec4<f32>,      // momentum of what was born in this step
+  part: f32, parts: u32,   // bodies make a step in so many parts, of such a length (s): one, unless pressure is implicit
+  at: u32, most_parts: u32,// the part they are in, and how many can be queued
+  mid: u32,                // 1 in parts before the last
+  idle: u32,               // 1 once there is no such part any more: their kernels then do nothing
+  halted: u32,             // 1 + the number of the solve that needs more rounds than were queued, else 0
+  stray: f32,              // how far particles of bodies have gone since they were sorted (m)
+  rounds: vec4<u32>,       // most rounds of each solve of a step in this frame
+  joint_impulse: vec4<f32>,// of this step on bodies by joints to what does not move
+  joint_force: vec4<f32>,  // the same of springs (N)
+}
+
+// How far implicit pressure is (E9): see interact/implicit.wgsl.
+struct Solve {
+  omega: f32, momentum: f32, pace: f32, best: f32,
+  residual: f32, iterations: u32, phase: u32, number: u32,
+  said: vec4<f32>,         // rounds and residual of places, of velocities
+  turn: u32, stray: atomic<u32>, unused: vec2<u32>,
+}
+// What implicit pressure does to a body, and what it got from outside in this step. thrust: by the shares of a round; push: the
+// accelerations by it; steady: by fluids, as it stands for all parts of a step; added: what is in the force besides what was summed.
+struct Swept {
+  thrust: vec4<f32>, twist: vec4<f32>, push: vec4<f32>, spin: vec4<f32>, steady: vec4<f32>, steady_torque: vec4<f32>,
+  added: vec4<f32>, added_torque: vec4<f32>, outside: vec4<f32>, impulse: vec4<f32>,
 }
 
 // What a step leaves behind, as `ledger::Ledger`.
@@ -110,7 +141,9 @@ struct Sums {
   crossed: vec4<f32>,      // w: sum of neighbours
   count: vec4<u32>,        // fluid alive, left, lost, not finite
   more: vec4<u32>,         // drained, rigid lost, with full support, fast contacts
-  impulse: vec4<f32>,      // that agents took by themselves
+  impulse: vec4<f32>,      // from outside, besides what `outer` gives in time; w: particles put back
+  fluids: vec4<f32>,       // the part of `outer` that fluids have; w: sum of (p / rho)^2
+  said: vec4<f32>,         // as in Solve
 }
 
 @group(0) @binding(0) var<uniform> m: Constants;
@@ -138,7 +171,7 @@ struct Sums {
 @group(0) @binding(22) var<storage, read_write> history: array<Sums>;           // 0: the last step; then one a step
 
 @group(0) @binding(23) var<storage, read_write> births: array<Birth>;
-@group(0) @binding(24) var<storage, read_write> held: array<vec4<f32>>;     // force that holds fluid inside hoses (N)
+@group(0) @binding(24) var<storage, read_write> held: array<Hold>;          // what holds fluid inside hoses
 @group(0) @binding(25) var<storage, read_write> agents: array<Agent>;
 @group(0) @binding(26) var<storage, read_write> strewn: array<Agent>;       // before the sort
 @group(0) @binding(27) var<storage, read_write> agent_starts: array<u32>;
@@ -147,6 +180,15 @@ struct Sums {
 @group(0) @binding(30) var<storage, read_write> agent_blocks: array<u32>;
 @group(0) @binding(31) var<storage, read_write> crowd: Crowd;
 @group(0) @binding(32) var<storage, read_write> slips: array<Slips>;        // by slot of rigid bodies; then as found in this step
+@group(0) @binding(33) var<storage, read_write> solve: Solve;
+@group(0) @binding(34) var<storage, read_write> swept: array<Swept>;
+@group(0) @binding(35) var<storage, read_write> spot: array<vec4<f32>>;     // sorted: place; w: share of fluids, volume of bodies' particles
+@group(0) @binding(36) var<storage, read_write> flow: array<vec4<f32>>;     // sorted: accelerations by shares, or velocities
+@group(0) @binding(37) var<storage, read_write> nodes: array<Node>;         // fluid
+@group(0) @binding(38) var<storage, read_write> work: array<vec4<f32>>;     // fluid: share found, error, rate, sum of shares over turns
+@group(0) @binding(39) var<storage, read_write> said: array<vec4<f32>>;     // by workgroups of 128 fluid particles
+@group(0) @binding(40) var<storage, read_write> squeezed: array<vec4<f32>>; // force of shares on bodies' particles (N), as touch
+@group(0) @binding(41) var<storage, read_write> joints: array<Joint>;
 
 // A flock: as flock::FlockConstants, and its clock. lead: place and velocity of its first agent.
 struct Rule {
@@ -161,9 +203,10 @@ struct Rule {
   body: vec4<f32>,      // size, clearance, contact diameter, margin of solid sides
   matter: vec4<f32>,    // mass (0: none), half_area, margin of open sides, distance behind the leader
   time: vec4<f32>,      // now, until the next decision, between decisions
-  kind: vec4<u32>,      // 0 Reynolds, 1 Couzin, 2 Vicsek; first agent; agents; relations, two bits a flock
+  kind: vec4<u32>,      // 0 Reynolds, 1 Couzin, 2 Vicsek; first agent; agents
   who: vec4<u32>,       // leader or GONE; 1 keeps to fluids, 2 flees bodies, 4 flees fluids; seed
   count: vec4<u32>,     // decisions, due, topological neighbours
+  relations: vec4<u32>, // two bits a flock
 }
 struct Agent {
   x: vec4<f32>,         // w: id (bits)

@@ -1,9 +1,10 @@
 //! Rust's side of the structures of `common.wgsl`: constants from a model, bodies and slots to and from a state.
 
-use super::program::{fields, hoses};
+use super::program::{fields, hoses, joined};
 use crate::flock::FlockConstants;
 use crate::integrate::sources::DrainRegion;
-use crate::model::Model;
+use crate::model::{DtBound, Model};
+use crate::scene::joint::JointModel;
 use crate::scene::{Force, Wall};
 use crate::state::{Body, HELD_CONTACTS, State};
 use bytemuck::{Pod, Zeroable};
@@ -15,6 +16,8 @@ pub const PART: usize = 128;
 pub const BLOCK: u32 = 2048;
 /// Bins behind the cells of a kind.
 pub const BINS: u32 = 4;
+/// Most flocks: two bits for each in a rule.
+pub const FLOCKS: usize = 64;
 /// A particle of a body that is outside the domain.
 pub const GONE: u32 = u32::MAX;
 
@@ -36,9 +39,11 @@ pub struct Constants {
     pub tune: V,
     pub contact: V,
     pub step: V,
+    pub rounds: V,
     pub cells: [u32; 4],
     pub count: [u32; 4],
     pub more: [u32; 4],
+    pub movers: [u32; 4],
 }
 
 /// A particle after its drift.
@@ -59,10 +64,11 @@ pub struct Drifted {
 #[repr(C)]
 pub struct GpuBody {
     pub pose: Pose,
-    pub v_half: V,
+    pub p: V,
+    pub p_half: V,
     pub l: V,
     pub l_half: V,
-    pub v_rest: V,
+    pub p_rest: V,
     pub l_rest: V,
     pub inertia: [V; 3],
     pub force: V,
@@ -139,6 +145,17 @@ pub struct Clock {
     pub listed: u32,
     pub next_id: u32,
     pub crossed: V,
+    pub part: f32,
+    pub parts: u32,
+    pub at: u32,
+    pub most_parts: u32,
+    pub mid: u32,
+    pub idle: u32,
+    pub halted: u32,
+    pub stray: f32,
+    pub rounds: [u32; 4],
+    pub joint_impulse: V,
+    pub joint_force: V,
 }
 
 /// A particle to be born.
@@ -163,6 +180,51 @@ pub struct Sums {
     pub count: [u32; 4],
     pub more: [u32; 4],
     pub impulse: V,
+    pub fluids: V,
+    pub said: V,
+}
+
+/// How far implicit pressure is: kernels alone read it.
+pub const SOLVE_BYTES: usize = 64;
+/// `Swept`.
+pub const SWEPT_BYTES: usize = 160;
+/// `Node`.
+pub const NODE_BYTES: usize = 48;
+
+/// A joint.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Joint {
+    pub anchor_a: V,
+    pub anchor_b: V,
+    pub axis_a: V,
+    pub axis_b: V,
+    pub across_a: V,
+    pub across_b: V,
+    pub turn: V,
+    pub law: V,
+    pub limits: V,
+    pub who: [u32; 4],
+}
+
+/// Joints, in the order of the scene.
+pub fn joints(model: &Model) -> Vec<Joint> {
+    let joint = |j: &JointModel| {
+        let [low, high] = j.limits.unwrap_or_default();
+        Joint {
+            anchor_a: single(j.anchor[0], 0.0),
+            anchor_b: single(j.anchor[1], 0.0),
+            axis_a: single(j.axis[0], 0.0),
+            axis_b: single(j.axis[1], 0.0),
+            across_a: single(j.across[0], 0.0),
+            across_b: single(j.across[1], 0.0),
+            turn: j.turn.as_quat().to_array(),
+            law: [j.stiffness, j.damping, j.length, model.largest_speed].map(|n| n as f32),
+            limits: [low as f32, high as f32, f32::from(j.limits.is_some()), 0.0],
+            who: [j.kind as u32, j.a as u32, j.b.map_or(GONE, |b| b as u32), 0],
+        }
+    };
+    model.joints.iter().map(joint).collect()
 }
 
 /// Three numbers and a fourth.
@@ -197,8 +259,12 @@ pub struct Sizes {
     pub slots: u32,
     /// Bodies.
     pub bodies: u32,
+    /// Those that have rigid slots: they move, or follow scripts.
+    pub movers: u32,
     /// Parts of bodies.
     pub parts: u32,
+    /// Parts of bodies that have rigid slots.
+    pub rigid_parts: u32,
     /// Cells of the grid.
     pub cells: u32,
     /// Groups of the ledger.
@@ -226,7 +292,10 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
     let (s, g, f) = (&model.solver, &model.grid, &model.factors);
     let rate = model.largest_speed / (s.contact_overlap * model.spacing);
     let open = (0..3).filter(|&a| g.walls[a] == Wall::Open).map(|a| 1 << a).sum();
-    let fixed = model.dt_bounds.iter().map(|b| b.1).fold(f64::from(f32::MAX), f64::min);
+    let (contact, others): (Vec<_>, Vec<_>) =
+        model.dt_bounds.iter().partition(|b| model.implicit() && b.0 == DtBound::Contact);
+    let least = |bounds: &[&(DtBound, f64)]| bounds.iter().map(|b| b.1).fold(f64::from(f32::MAX), f64::min) as f32;
+    let steps = if model.implicit() { model.bounds_of_flow() } else { [s.courant, s.courant_force] };
     let [x, y, z] = g.cells.map(|c| c as u32);
     let base = Constants {
         lower: with(g.lower, model.spacing as f32),
@@ -236,14 +305,16 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         period: with(g.period, model.contact_diameter as f32),
         gravity: single(model.gravity, model.sound_speed as f32),
         corner: single(g.min, model.full_support as f32),
-        far_corner: single(g.max, 0.0),
+        far_corner: single(g.max, model.longest_step() as f32),
         kernel: [f.w, f.g, f.w_spacing, f.w_own],
         tune: [f.laplacian, model.softening(), s.xsph as f32, s.shifting as f32],
-        contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 1.0, 0.0],
-        step: [s.courant as f32, s.courant_force as f32, fixed as f32, s.dt.unwrap_or(0.0) as f32],
+        contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 1.0, model.hold_limit()],
+        step: [steps[0] as f32, steps[1] as f32, least(&others), s.dt.unwrap_or(0.0) as f32],
+        rounds: [s.tolerance as f32, s.divergence_tolerance as f32, s.iterations as f32, least(&contact)],
         cells: [x, y, z, sizes.cells],
         count: [sizes.fluids, sizes.rigid, sizes.slots, sizes.bodies],
         more: [sizes.parts, sizes.blocks(), sizes.groups, open],
+        movers: [sizes.movers, 0, 0, 0],
     };
     let mut bytes = bytemuck::bytes_of(&base).to_vec();
     for f in &model.fluids {
@@ -294,6 +365,12 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
     if model.drains.is_empty() {
         bytes.extend([0; 48]);
     }
+    for [a, b] in joined(model) {
+        bytes.extend(bytemuck::bytes_of(&[a, b, 0, 0]));
+    }
+    if joined(model).next().is_none() {
+        bytes.extend([0; 16]);
+    }
     bytes
 }
 
@@ -313,6 +390,11 @@ pub fn pose(body: &Body) -> Pose {
     }
 }
 
+/// What rounding to single precision leaves over: to be taken from what is kept.
+fn left_over(v: DVec3) -> DVec3 {
+    v.as_vec3().as_dvec3() - v
+}
+
 /// Bodies with the parts that `first` and `count` tell.
 pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> {
     let body = |(k, b): (usize, &Body)| {
@@ -321,19 +403,27 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
         let first = parts.iter().position(|p| p[0] == k as u32).unwrap_or(0);
         let count = b.slots.len().div_ceil(PART);
         let radius = state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max);
+        let mass = if b.is_static() { 0.0 } else { b.mass };
+        let p = mass * b.v;
         let particle = if b.is_static() { 0.0 } else { b.mass / b.slots.len().max(1) as f64 };
         GpuBody {
             pose: pose(b),
-            v_half: single(b.v_half, 0.0),
+            p: single(p, 0.0),
+            p_half: single(mass * b.v_half, 0.0),
             l: single(b.l, 0.0),
             l_half: single(b.l_half, 0.0),
+            p_rest: single(left_over(p), 0.0),
+            l_rest: single(left_over(b.l), 0.0),
             inertia: [single(inertia.x_axis, radius as f32), single(inertia.y_axis, 0.0), single(inertia.z_axis, 0.0)],
             force: single(b.force, b.sharers),
             torque: single(b.torque, 0.0),
+            force_fluid: single(b.force_fluid, 0.0),
+            force_contact: single(b.force_contact, 0.0),
+            torque_fluid: single(b.torque_fluid, 0.0),
+            torque_contact: single(b.torque_contact, 0.0),
             law: [c.ln_restitution, c.shared_by, c.face, c.friction],
             stated: [c.stiffness, c.damping, particle as f32, f32::from(b.one_way)],
             counts: [b.contacts, 0, first as u32, count as u32],
-            ..GpuBody::default()
         }
     };
     state.bodies.body.iter().enumerate().map(body).collect()
@@ -345,8 +435,9 @@ pub fn to_body(from: &GpuBody, body: &mut Body) {
     if !body.is_static() {
         body.x = double(p.x) - double(p.rest);
         body.q = DQuat::from_array(p.q.map(f64::from));
-        (body.v, body.omega) = (double(p.v), double(p.omega));
-        (body.l, body.v_half, body.l_half) = (double(from.l), double(from.v_half), double(from.l_half));
+        (body.v, body.omega) = ((double(from.p) - double(from.p_rest)) / body.mass, double(p.omega));
+        (body.l, body.l_half) = (double(from.l) - double(from.l_rest), double(from.l_half));
+        body.v_half = double(from.p_half) / body.mass;
         body.sharers = from.force[3];
     }
     (body.force, body.torque) = (double(from.force), double(from.torque));
@@ -412,6 +503,7 @@ pub struct Rule {
     pub kind: [u32; 4],
     pub who: [u32; 4],
     pub count: [u32; 4],
+    pub relations: [u32; 4],
 }
 
 /// `Crowd` without its rules.
@@ -479,7 +571,10 @@ pub fn crowd(model: &Model, state: &State, sizes: Sizes) -> Vec<u8> {
 
 fn rule(model: &Model, f: &FlockConstants, clock: &crate::state::Clock) -> Rule {
     let (u, w) = (&f.limits, &f.weights);
-    let relations = f.relations.iter().enumerate().map(|(k, r)| (*r as u32) << (2 * k)).sum();
+    let mut relations = [0; 4];
+    for (k, relation) in f.relations.iter().enumerate().take(FLOCKS) {
+        relations[k / 16] |= (*relation as u32) << (2 * (k % 16));
+    }
     let flags = u32::from(f.keep_to_fluids) | u32::from(f.flee_bodies) << 1 | u32::from(f.flee_fluids) << 2;
     let matter = f.matter.map_or([0.0; 2], |m| [m.mass, m.half_area]);
     Rule {
@@ -498,9 +593,10 @@ fn rule(model: &Model, f: &FlockConstants, clock: &crate::state::Clock) -> Rule 
         ],
         matter: [matter[0], matter[1], f.margin[1], f.leader.map_or(0.0, |l| l.1)],
         time: [clock.time as f32, clock.wait as f32, f.tau as f32, 0.0],
-        kind: [f.model as u32, f.first as u32, f.count as u32, relations],
+        kind: [f.model as u32, f.first as u32, f.count as u32, 0],
         who: [f.leader.map_or(GONE, |l| l.0 as u32), flags, f.seed as u32, (f.seed >> 32) as u32],
         count: [clock.decisions as u32, 0, f.neighbours as u32, 0],
+        relations,
         ..Rule::default()
     }
 }
@@ -575,22 +671,56 @@ mod tests {
         same!("Touch", Touch, fluid, contact, couple);
         same!("Slips", Slips, held);
         same!(
-            "Clock", Clock, dt, dt_before, left, drag, gravity, fastest, running, step, live, bound, own, time,
-            elapsed, births, born, listed, next_id, crossed
+            "Clock",
+            Clock,
+            dt,
+            dt_before,
+            left,
+            drag,
+            gravity,
+            fastest,
+            running,
+            step,
+            live,
+            bound,
+            own,
+            time,
+            elapsed,
+            births,
+            born,
+            listed,
+            next_id,
+            crossed,
+            part,
+            parts,
+            at,
+            most_parts,
+            mid,
+            idle,
+            halted,
+            stray,
+            rounds,
+            joint_impulse,
+            joint_force
         );
-        same!("Sums", Sums, step, energy, momentum, outer, total, crossed, count, more, impulse);
+        same!("Joint", Joint, anchor_a, anchor_b, axis_a, axis_b, across_a, across_b, turn, law, limits, who);
+        for (name, bytes) in [("Solve", SOLVE_BYTES), ("Swept", SWEPT_BYTES), ("Node", NODE_BYTES)] {
+            assert_eq!(layout(&module, name).1 as usize, bytes, "{name}");
+        }
+        same!("Sums", Sums, step, energy, momentum, outer, total, crossed, count, more, impulse, fluids, said);
         same!("Agent", Agent, x, v, next, rest, force, drag, own, felt);
         same!(
             "Rule", Rule, lead_x, lead_v, goal, radii, limits, pull, drive, fear, sense, body, matter, time, kind, who,
-            count
+            count, relations
         );
         same!(
             "Body",
             GpuBody,
-            v_half,
+            p,
+            p_half,
             l,
             l_half,
-            v_rest,
+            p_rest,
             l_rest,
             force,
             torque,

@@ -9,7 +9,7 @@ fn both(a: Sums, b: Sums) -> Sums {
     vec4<f32>(a.energy.xyz + b.energy.xyz, max(a.energy.w, b.energy.w)),
     a.momentum + b.momentum, a.outer + b.outer,
     vec4<f32>(a.total.xyz + b.total.xyz, max(a.total.w, b.total.w)),
-    a.crossed + b.crossed, a.count + b.count, a.more + b.more, a.impulse + b.impulse);
+    a.crossed + b.crossed, a.count + b.count, a.more + b.more, a.impulse + b.impulse, a.fluids + b.fluids, a.said + b.said);
 }
 
 fn of_fluid(i: u32) -> Sums {
@@ -24,7 +24,14 @@ fn of_fluid(i: u32) -> Sums {
   var outside = clock.gravity.xyz + fields_at(r.x.xyz, r.v.xyz);
   if (VORTICITY) { outside += vorticity[i].xyz; }
   s.outer = vec4<f32>(fluid.mass * outside, 0.0);
-  if (HAS_HOSES > 0u) { s.outer += held[i]; }
+  if (HAS_HOSES > 0u) {
+    s.outer += held[i].force;
+    if (IMPLICIT) { s.impulse = held[i].impulse; }
+  }
+  if (IMPLICIT) {
+    let head = r.v.w / fluid.density;
+    s.fluids = vec4<f32>(s.outer.xyz, head * head);
+  }
   s.energy = vec4<f32>(0.5 * fluid.mass * speed * speed, -fluid.mass * dot(m.gravity.xyz, r.x.xyz - m.corner.xyz), fluid.mass * s.step.w, 0.0);
   let near = bitcast<u32>(before[i].w);
   s.crossed.w = f32(near & 0xffffu) - 1.0;
@@ -40,6 +47,13 @@ fn of_fluid(i: u32) -> Sums {
 fn of_body(k: u32) -> Sums {
   var s = Sums();
   let b = bodies[k];
+  if (IMPLICIT) {
+    // what bodies got by implicit pressure, fluids lost
+    let added = swept[k].added.xyz;
+    s.total = vec4<f32>(-added, 0.0);
+    s.energy.z = length(added);
+    s.impulse = swept[k].impulse;
+  }
   if (b.x.w == 0.0) {
     s.outer = vec4<f32>(-b.force.xyz, 0.0);
     return s;
@@ -47,11 +61,11 @@ fn of_body(k: u32) -> Sums {
   let mass = b.rest.w;
   let speed = length(b.v.xyz);
   s.momentum = mass * vec4<f32>(b.v.xyz, speed);
-  s.total = vec4<f32>(b.force.xyz, 0.0);
+  s.total += vec4<f32>(b.force.xyz, 0.0);
   var outside = mass * clock.gravity.xyz;
   if (b.stated.w > 0.0) { outside -= b.force_fluid.xyz; }
   s.outer = vec4<f32>(outside, 0.0);
-  s.energy = vec4<f32>(0.5 * (mass * speed * speed + dot(b.l.xyz, b.omega.xyz)), -mass * dot(m.gravity.xyz, b.x.xyz - m.corner.xyz), length(b.force.xyz), 0.0);
+  s.energy += vec4<f32>(0.5 * (mass * speed * speed + dot(b.l.xyz, b.omega.xyz)), -mass * dot(m.gravity.xyz, b.x.xyz - m.corner.xyz), length(b.force.xyz), 0.0);
   if (!(finite(b.x.x + b.x.y + b.x.z) && finite(speed) && finite(b.l.x + b.l.y + b.l.z))) { s.count.w = 1u; }
   s.more.w = b.counts.y >> 1u;
   return s;
@@ -85,11 +99,21 @@ fn tally(@builtin(workgroup_id) g: vec3<u32>, @builtin(local_invocation_index) l
   var sum = Sums();
   if (clock.running != 0u) {
     for (var i = g.x * GROUP + l; i < live_fluid(); i += stride) { sum = both(sum, of_fluid(i)); }
+  }
+  let all = in_group(l, sum);
+  if (l == 0u) { sums[g.x] = all; }
+}
+
+@compute @workgroup_size(128)
+fn tally_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let stride = m.more.z * GROUP;
+  var sum = Sums();
+  if (clock.running != 0u) {
     for (var k = g.x * GROUP + l; k < m.count.w; k += stride) { sum = both(sum, of_body(k)); }
     for (var at = m.count.x + g.x * GROUP + l; at < rigid_end(); at += stride) { sum = both(sum, of_slot(at)); }
   }
   let all = in_group(l, sum);
-  if (l == 0u) { sums[g.x] = all; }
+  if (l == 0u) { sums[g.x] = both(sums[g.x], all); }
 }
 
 @compute @workgroup_size(128)
@@ -108,8 +132,19 @@ fn total(@builtin(local_invocation_index) l: u32) {
     sum.crossed += vec4<f32>(clock.crossed.xyz, 0.0);
     clock.crossed = vec4<f32>(0.0);
   }
+  if (IMPLICIT && clock.running != 0u) {
+    // what a step has driven into walls was put back
+    for (var k = l; k < (clock.live + GROUP - 1u) / GROUP; k += GROUP) { sum.impulse += said[k]; }
+  }
   var all = in_group(l, sum);
   if (l != 0u || clock.running == 0u) { return; }
+  if (IMPLICIT) {
+    all.impulse += vec4<f32>(clock.dt * history[0].fluids.xyz, 0.0);
+    all.said = solve.said;
+  }
+  all.impulse += clock.joint_impulse;
+  all.outer += clock.joint_force;
+  clock.joint_impulse = vec4<f32>(0.0);
   let c = m.cells.w;
   let r = bins_of(RIGID) + c;
   all.step.x = clock.dt;
@@ -133,7 +168,7 @@ fn total(@builtin(local_invocation_index) l: u32) {
 // The length of the next step, where kernels choose it: the twin of `World::next_dt` and `Model::largest_dt`.
 @compute @workgroup_size(1)
 fn choose() {
-  if (clock.own == 0u) { return; }
+  if (clock.own == 0u || clock.running == 0u) { return; }
   var left = clock.left - clock.gravity.w;
   if (clock.left <= 0.0) { clock.running = 0u; return; }
   var end = BY_FRAME;
@@ -147,7 +182,15 @@ fn choose() {
   let last = history[0];
   var dt = m.step.w;
   var bound = BY_SCENE;
-  if (dt == 0.0) {
+  var part = 1e30;
+  if (IMPLICIT) {
+    let by_flow = flow_step(last);
+    dt = by_flow.x;
+    bound = u32(by_flow.y);
+    // contacts have steps of their own, as many as were queued at most
+    part = min(m.rounds.w, TRAVEL * m.period.w / max(last.energy.w, 1e-30));
+    if (part * f32(clock.most_parts) < dt) { dt = part * f32(clock.most_parts); bound = BY_CONTACT; }
+  } else if (dt == 0.0) {
     dt = m.step.z;
     bound = BY_CONSTANT;
     if (HAS_FLUIDS) {
@@ -170,4 +213,20 @@ fn choose() {
   }
   clock.dt = dt;
   clock.bound = bound;
+  clock.parts = u32(clamp(ceil(dt / part * 0.999999), 1.0, f32(max(clock.most_parts, 1u))));
+  clock.part = dt / f32(clock.parts);
+  clock.at = 0u;
+}
+
+// With implicit pressure: the step that the flow allows, and what bounds it.
+fn flow_step(last: Sums) -> vec2<f32> {
+  var dt = select(1e30, m.step.w, m.step.w > 0.0);
+  var bound = BY_SCENE;
+  if (m.far_corner.w < dt) { dt = m.far_corner.w; bound = BY_LONGEST; }
+  let pressed = pow(3.0 * last.fluids.w / max(f32(last.count.x), 1.0), 0.25);
+  let speed = max(last.step.z, m.step.y * pressed);
+  let way = 2.0 * m.step.x / (speed + sqrt(speed * speed + 4.0 * last.step.w * m.step.x) + 1e-30);
+  if (way < dt) { dt = way; bound = BY_FLOW; }
+  if (m.step.z < dt) { dt = m.step.z; bound = BY_CONSTANT; }
+  return vec2<f32>(dt, f32(bound));
 }

@@ -3,24 +3,27 @@
 //! State stays on the device. Steps of a frame are queued without waiting: kernels choose their length, and what the ledger
 //! found of each comes home when the frame is over. Only when someone asks for the state is it fetched.
 
+mod kernels;
 mod layout;
 mod program;
+mod queue;
 mod transfer;
 
 use super::{Backend, Batch, Request};
 use crate::gpu::{Gpu, GpuError};
 use crate::integrate::Advance;
 use crate::integrate::sources::{self, Birth};
-use crate::ledger::Ledger;
+use crate::ledger::{Ledger, Solve};
 use crate::model::{DtBound, Model};
 use crate::stage::Stage;
 use crate::state::{Body, Record, State};
+use kernels::{Over, Times};
 use layout::{Clock, GpuBody, Pose, Sizes, Sums, double};
-use program::{BOUNDS, Kernelet, Over, Program};
+use program::{BOUNDS, Kernelet, Program};
+use queue::Timers;
 use std::collections::VecDeque;
 use std::mem::size_of;
 use std::sync::OnceLock;
-use std::time::Duration;
 use transfer::Buffers;
 
 /// Most steps whose statistics are kept until they come home.
@@ -29,6 +32,8 @@ const LOGGED: usize = 512;
 const LISTED: usize = 1 << 16;
 /// Steps in one submission: a display must not wait for long.
 const SUBMITTED: usize = 8;
+/// Solves of implicit pressure in a step at most.
+const SOLVES: usize = 3;
 
 /// The GPU backend.
 pub struct OnGpu {
@@ -49,6 +54,8 @@ pub struct OnGpu {
     /// What the last step left behind, for the length of the next.
     last: Sums,
     flows: Flows,
+    /// Rounds that are queued for each solve of a step: a little more than steps before needed.
+    rounds: [usize; SOLVES],
 }
 
 /// Of the model's sources, what buffers and kernels were made for.
@@ -71,33 +78,14 @@ type Kernels = Vec<(Kernelet, [u32; 2])>;
 struct Ready {
     sizes: Sizes,
     buffers: Buffers,
-    stages: Vec<(Stage, Kernels)>,
+    stages: Vec<(Stage, Vec<(Times, Kernels)>)>,
     choose: Kernelet,
     timers: Option<Timers>,
 }
 
-/// Timestamps round each stage of one step.
-struct Timers {
-    ticks: wgpu::QuerySet,
-    resolved: wgpu::Buffer,
-    home: wgpu::Buffer,
-}
-
 /// Why a scene cannot run on a GPU yet, in words.
 pub fn unsupported(model: &Model) -> Option<&'static str> {
-    if model.implicit() {
-        return Some("implicit pressure (solver.pressure = \"dfsph\" or \"pbf\")");
-    }
-    if !model.joints.is_empty() {
-        return Some("joints");
-    }
-    if model.flocks.len() > 16 {
-        return Some("more than sixteen flocks");
-    }
-    if model.flocks.iter().any(|f| f.neighbours > 16) {
-        return Some("more than sixteen topological neighbours");
-    }
-    None
+    (model.flocks.len() > layout::FLOCKS).then_some("more than sixty-four flocks")
 }
 
 impl OnGpu {
@@ -124,6 +112,7 @@ impl OnGpu {
             fault: OnceLock::new(),
             last: Sums::default(),
             flows: Flows::default(),
+            rounds: [4; SOLVES],
         }
     }
 
@@ -139,7 +128,7 @@ impl OnGpu {
     }
 
     fn prepare(&mut self, model: &Model, state: &State) -> Result<(), GpuError> {
-        let gpu = &self.gpu;
+        let (gpu, solver) = (&self.gpu, model.solver.pressure);
         let ready = gpu.attempt(|| {
             let program = Program::new(gpu, model)?;
             let most = gpu.device.limits().max_storage_buffers_per_shader_stage;
@@ -151,16 +140,19 @@ impl OnGpu {
                 Buffers::new(gpu, model, state, LOGGED, if model.sources.is_empty() { 0 } else { LISTED })?;
             let groups = |over| folded(gpu, groups(over, sizes));
             let stage = |stage: Stage| {
-                let wanted = |name| program::wanted(name, model, sizes.bodies > 0);
-                let kernels = program::kernels(stage).iter().filter(|(name, _)| wanted(name));
-                let made = kernels.map(|&(name, over)| (program.kernel(gpu, name, &buffers.all), groups(over)));
-                (stage, made.filter(|(_, g)| g[0] > 0).collect())
+                let wanted = |name| kernels::wanted(name, model, sizes.bodies > 0);
+                let made = |&&(name, over): &&(&'static str, Over)| wanted(name) && groups(over)[0] > 0;
+                let kernel = |&(name, over)| (program.kernel(gpu, name, &buffers.all), groups(over));
+                let sections = kernels::sections(stage, solver).iter();
+                let sections =
+                    sections.map(|(times, kernels)| (*times, kernels.iter().filter(made).map(kernel).collect()));
+                (stage, sections.collect())
             };
             Ok(Ready {
                 sizes,
-                stages: Stage::WCSPH.into_iter().map(stage).collect(),
+                stages: Stage::order(solver).iter().copied().map(stage).collect(),
                 choose: program.kernel(gpu, "choose", &buffers.all),
-                timers: Timers::new(gpu),
+                timers: Timers::new(gpu, Stage::order(solver).len() as u32),
                 buffers,
             })
         })?;
@@ -252,8 +244,8 @@ impl Backend for OnGpu {
     fn sources_changed(&mut self, model: &Model, time: f64) {
         if Flows::of(model) != self.flows {
             let state = self.download().clone();
-            self.upload(model, state);
-            self.known = time;
+            (self.coming, self.known, self.flows) = (VecDeque::new(), time, Flows::of(model));
+            self.rebuild(model, state);
             return;
         }
         // what was to come is listed anew
@@ -284,31 +276,31 @@ impl Backend for OnGpu {
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
         self.present = OnceLock::new();
-        if stage == Stage::Drift || (stage == Stage::Cells && !self.drifted) {
+        let advance = Advance { parts: advance.parts.max(1), ..advance };
+        let order = Stage::order(model.solver.pressure);
+        if Some(&stage) == order.first() || (stage == Stage::Cells && !self.drifted) {
             let gravity = layout::single(model.gravity_at(advance.end()), 0.0);
             let (dt, drag) = (advance.dt as f32, advance.drag as f32);
             let listed = self.list_births(model, advance.time, advance.end());
             let dt_before = advance.dt_before as f32;
-            self.write_clock(Clock { dt, dt_before, drag, gravity, running: 1, own: 0, ..listed });
-            self.scripts(model, advance);
+            let (parts, part) = (advance.parts, advance.part() as f32);
+            let clock = Clock { dt, dt_before, drag, gravity, running: 1, own: 0, part, parts, at: 0, ..listed };
+            self.write_clock(clock);
+        }
+        // what is sorted is what has drifted: without a drift, all stay where they are
+        if stage == Stage::Cells && !self.drifted && self.clock.dt == 0.0 {
+            self.run_stage(Stage::Drift, model, Advance { dt: 0.0, ..advance });
         }
         self.drifted = stage == Stage::Drift || (self.drifted && stage != Stage::Cells);
-        let undrifted = stage == Stage::Cells && !self.drifted && self.clock.dt == 0.0;
+        self.run_stage(stage, model, advance);
+        if stage != Stage::Ledger {
+            return;
+        }
         let found = self.attempt(|gpu, ready| {
-            let mut commands = gpu.device.create_command_encoder(&Default::default());
-            // what is sorted is what has drifted: without a drift, all stay where they are
-            let before = ready.stages.iter().filter(|(s, _)| undrifted && *s == Stage::Drift);
-            for (_, kernels) in before.chain(ready.stages.iter().filter(|(s, _)| *s == stage)) {
-                dispatch(&mut commands, kernels, None);
-            }
-            gpu.queue.submit([commands.finish()]);
-            if stage != Stage::Ledger {
-                return Ok(None);
-            }
             let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 0, 1)?;
-            Ok(Some((sums, ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1)?)))
+            Ok((sums, ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1)?))
         });
-        if let Some((sums, clock)) = found.flatten() {
+        if let Some((sums, clock)) = found {
             self.take(model, &sums);
             self.settle_births(clock[0]);
         }
@@ -320,10 +312,14 @@ impl Backend for OnGpu {
         }
         self.present = OnceLock::new();
         let last = &self.ledger;
-        let (guess, _) = model.largest_dt(last.speed, last.acceleration);
+        let (guess, _) = model.largest_dt(model.bounding_speed(last), last.acceleration);
+        let (one, body_speed) = (request.most == 1, last.body_speed);
         let wanted = (request.left / guess * 1.02).ceil() + 1.0;
         let steps = (wanted.min(LOGGED as f64 - 1.0) as usize).min(request.most);
         let ahead = (1.5 * guess * steps as f64).min(request.left);
+        // steps grow, and bodies get faster, until the host looks again
+        let (longest, faster) = if one { (guess.min(request.left), 1.0) } else { (1.25 * guess, 1.25) };
+        let most_parts = if model.implicit() { model.substeps(longest, faster * body_speed) } else { 1 };
         let listed = self.list_births(model, request.time, request.time + ahead);
         self.write_clock(Clock {
             left: request.left.min(f64::from(f32::MAX)) as f32,
@@ -331,33 +327,19 @@ impl Backend for OnGpu {
             drag: request.drag as f32,
             running: 1,
             own: 1,
+            most_parts,
+            rounds: [0; 4],
             ..listed
         });
-        let (sums, ticks, clock) = self.attempt(|gpu, ready| {
-            let mut made = 0;
-            while made < steps {
-                let mut commands = gpu.device.create_command_encoder(&Default::default());
-                for step in made..(made + SUBMITTED).min(steps) {
-                    let timers = ready.timers.as_ref().filter(|_| step == 0);
-                    dispatch_one(&mut commands, &ready.choose, [1, 1]);
-                    for (k, (_, kernels)) in ready.stages.iter().enumerate() {
-                        dispatch(&mut commands, kernels, timers.map(|t| (t, k as u32)));
-                    }
-                    if let Some(timers) = timers {
-                        timers.resolve(&mut commands);
-                    }
-                }
-                gpu.queue.submit([commands.finish()]);
-                made += SUBMITTED;
-            }
-            let clock: Vec<Clock> = ready.buffers.fetch(gpu, ready.buffers.clock(), 0, 1)?;
-            let done = clock[0].step as usize;
+        let clock = self.queue_steps(model, steps, most_parts as usize)?;
+        let (sums, ticks) = self.attempt(|gpu, ready| {
+            let done = clock.step as usize;
             let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 1, done.max(1))?;
             let ticks = match &ready.timers {
                 Some(timers) => timers.read(gpu, &ready.buffers)?,
                 None => Vec::new(),
             };
-            Ok((sums[..done].to_vec(), ticks, clock[0]))
+            Ok((sums[..done].to_vec(), ticks))
         })?;
         self.settle_births(clock);
         let mut batch = Batch::default();
@@ -366,9 +348,7 @@ impl Backend for OnGpu {
             let bound = BOUNDS.get(s.step[1].to_bits() as usize).copied().unwrap_or(DtBound::Frame);
             batch.steps.push((f64::from(s.step[0]), bound, self.ledger.clone()));
         }
-        for (time, tick) in batch.stages.iter_mut().zip(ticks) {
-            *time = tick * sums.len() as u32;
-        }
+        batch.stages = ticks.into_iter().map(|tick| tick * sums.len() as u32).collect();
         Some(batch)
     }
 
@@ -430,20 +410,42 @@ impl OnGpu {
     fn grow(&mut self, model: &Model, more: usize) {
         let mut state = self.download().clone();
         state.particles.grow(more);
+        self.rebuild(model, state);
+    }
+
+    /// Other buffers for a state; what the last step left behind goes on.
+    fn rebuild(&mut self, model: &Model, state: State) {
+        let swept = self.attempt(|gpu, ready| {
+            let swept = ready.buffers.swept();
+            ready.buffers.fetch::<u8>(gpu, swept, 0, swept.size() as usize)
+        });
         if let Err(fault) = self.prepare(model, &state) {
             self.fail(fault);
         }
-        let last = self.last;
+        let (last, clock) = (self.last, self.clock);
         self.attempt(|gpu, ready| {
             gpu.queue.write_buffer(ready.buffers.log(), 0, bytemuck::bytes_of(&last));
+            gpu.queue.write_buffer(ready.buffers.clock(), 0, bytemuck::bytes_of(&clock));
+            gpu.queue.write_buffer(ready.buffers.swept(), 0, &swept.unwrap_or_default());
             Ok(())
         });
         self.start = state;
     }
 
-    /// Bodies that follow scripts take the poses of the end of a step (E15).
+    /// Bodies that follow scripts take the poses of the end of a step (E15), or of a part of it; so does shaking.
     fn scripts(&mut self, model: &Model, advance: Advance) {
-        if advance.drag > 0.0 || advance.dt == 0.0 || model.paths.iter().all(Option::is_none) {
+        if advance.drag > 0.0 || advance.dt == 0.0 {
+            return;
+        }
+        if !model.shakes.is_empty() {
+            let gravity = layout::single(model.gravity_at(advance.end()), 0.0);
+            let at = bytemuck::offset_of!(Clock, gravity) as u64;
+            self.attempt(|gpu, ready| {
+                gpu.queue.write_buffer(ready.buffers.clock(), at, bytemuck::bytes_of(&gravity));
+                Ok(())
+            });
+        }
+        if model.paths.iter().all(Option::is_none) {
             return;
         }
         let mut moved: Vec<(usize, Pose)> = Vec::new();
@@ -479,7 +481,9 @@ fn groups(over: Over, s: Sizes) -> u32 {
         Over::Cells(size) => s.bins().div_ceil(size),
         Over::Blocks => s.blocks(),
         Over::Bodies(size) => s.bodies.div_ceil(size),
+        Over::Movers(size) => s.movers.div_ceil(size),
         Over::Parts => s.parts,
+        Over::RigidParts => s.rigid_parts,
         Over::Groups => s.groups,
         Over::Agents(size) => s.agents.div_ceil(size),
         Over::AgentCells(size) => (s.agent_cells + 2).div_ceil(size),
@@ -494,30 +498,6 @@ fn folded(gpu: &Gpu, groups: u32) -> [u32; 2] {
     let most = gpu.device.limits().max_compute_workgroups_per_dimension;
     let x = groups.min(most);
     [x, groups.div_ceil(x.max(1))]
-}
-
-fn dispatch(commands: &mut wgpu::CommandEncoder, kernels: &[(Kernelet, [u32; 2])], timers: Option<(&Timers, u32)>) {
-    let timestamp_writes = timers.map(|(timers, k)| wgpu::ComputePassTimestampWrites {
-        query_set: &timers.ticks,
-        beginning_of_pass_write_index: Some(2 * k),
-        end_of_pass_write_index: Some(2 * k + 1),
-    });
-    if kernels.is_empty() && timestamp_writes.is_none() {
-        return;
-    }
-    let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
-    for (kernel, [x, y]) in kernels {
-        pass.set_pipeline(&kernel.pipeline);
-        pass.set_bind_group(0, &kernel.bound, &[]);
-        pass.dispatch_workgroups(*x, *y, 1);
-    }
-}
-
-fn dispatch_one(commands: &mut wgpu::CommandEncoder, kernel: &Kernelet, [x, y]: [u32; 2]) {
-    let mut pass = commands.begin_compute_pass(&Default::default());
-    pass.set_pipeline(&kernel.pipeline);
-    pass.set_bind_group(0, &kernel.bound, &[]);
-    pass.dispatch_workgroups(x, y, 1);
 }
 
 /// A ledger from the sums of a step and the ledger before.
@@ -549,40 +529,9 @@ fn to_ledger(s: &Sums, before: &Ledger) -> Ledger {
         rigid_lost: rigid_lost as usize,
         fast_contacts: before.fast_contacts + u64::from(fast),
         nonfinite: before.nonfinite + u64::from(nonfinite),
-        ..Ledger::default()
-    }
-}
-
-impl Timers {
-    fn new(gpu: &Gpu) -> Option<Self> {
-        let count = 2 * Stage::WCSPH.len() as u32;
-        let bytes = 8 * u64::from(count);
-        let buffer = |label, usage| {
-            let descriptor =
-                wgpu::BufferDescriptor { label: Some(label), size: bytes, usage, mapped_at_creation: false };
-            gpu.device.create_buffer(&descriptor)
-        };
-        gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY).then(|| Self {
-            ticks: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("stages"),
-                ty: wgpu::QueryType::Timestamp,
-                count,
-            }),
-            resolved: buffer("ticks", wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
-            home: buffer("ticks at home", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
-        })
-    }
-
-    fn resolve(&self, commands: &mut wgpu::CommandEncoder) {
-        commands.resolve_query_set(&self.ticks, 0..2 * Stage::WCSPH.len() as u32, &self.resolved, 0);
-        commands.copy_buffer_to_buffer(&self.resolved, 0, &self.home, 0, self.resolved.size());
-    }
-
-    /// Time of each stage in the step that was measured.
-    fn read(&self, gpu: &Gpu, buffers: &Buffers) -> Result<Vec<Duration>, GpuError> {
-        let ticks: Vec<u64> = buffers.mapped(gpu, &self.home)?;
-        let period = f64::from(gpu.queue.get_timestamp_period());
-        let span = |t: &[u64]| Duration::from_nanos((t[1].saturating_sub(t[0]) as f64 * period) as u64);
-        Ok(ticks.chunks_exact(2).map(span).collect())
+        put_back: before.put_back + s.impulse[3] as u64,
+        pressed: (3.0 * number(s.fluids[3]) / f64::from(fluid.max(1))).powf(0.25),
+        pressure: Solve { iterations: s.said[0] as u32, residual: number(s.said[1]) },
+        divergence: Solve { iterations: s.said[2] as u32, residual: number(s.said[3]) },
     }
 }

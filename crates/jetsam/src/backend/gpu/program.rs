@@ -4,7 +4,6 @@
 //! no other, as devices allow few.
 
 use super::GpuError;
-use super::layout::BLOCK;
 use crate::gpu::Gpu;
 use crate::integrate::sources::Bore;
 use crate::interact::contacts::{DEEP, HELD};
@@ -13,15 +12,16 @@ use crate::interact::pressure::BELOW_SUM;
 use crate::laws::kernel::Kernel;
 use crate::model::{CONTACT_REACH, DtBound, Model, TANGENTIAL, TANGENTIAL_DAMPING, TRAVEL};
 use crate::scene::{
-    Coupling, Damping, Density, EquationOfState, Force, Integrator, PressureForce, Surface, Viscosity, Wall,
+    Coupling, Damping, Density, EquationOfState, Force, Integrator, Pressure, PressureForce, Surface, Viscosity, Wall,
 };
-use crate::stage::Stage;
 use glam::DVec3;
 use std::fmt::Write as _;
 use wgpu::naga;
 
 /// What bounds a step, by the number kernels know it by.
-pub const BOUNDS: [DtBound; 8] = [
+pub const BOUNDS: [DtBound; 10] = [
+    DtBound::Flow,
+    DtBound::Longest,
     DtBound::Sound,
     DtBound::Force,
     DtBound::Viscosity,
@@ -33,11 +33,12 @@ pub const BOUNDS: [DtBound; 8] = [
 ];
 
 /// The texts, in the order of the step.
-const TEXTS: [&str; 16] = [
+const TEXTS: [&str; 19] = [
     include_str!("../../laws/kernel.wgsl"),
     include_str!("../../laws/fluid.wgsl"),
     include_str!("../../laws/contact.wgsl"),
     include_str!("../../laws/field.wgsl"),
+    include_str!("../../laws/implicit.wgsl"),
     include_str!("../../laws/flock.wgsl"),
     include_str!("common.wgsl"),
     include_str!("../../integrate/particles.wgsl"),
@@ -52,84 +53,11 @@ const TEXTS: [&str; 16] = [
         include_str!("../../interact/forces.wgsl"),
         include_str!("ledger.wgsl")
     ),
+    concat!(include_str!("../../interact/links.wgsl"), include_str!("../../interact/implicit.wgsl")),
+    concat!(include_str!("parts.wgsl"), include_str!("../../integrate/joints.wgsl")),
     include_str!("../../flock/agents.wgsl"),
     include_str!("../../flock/decide.wgsl"),
 ];
-
-/// Over what a kernel runs, and how many invocations make a workgroup.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Over {
-    /// Places of fluid particles.
-    Fluids(u32),
-    /// Particles of all bodies.
-    BodyParticles(u32),
-    /// Slots of rigid bodies.
-    Slots(u32),
-    /// Places of fluids and slots of rigid bodies.
-    Moving(u32),
-    /// Cells of fluids and of rigid bodies.
-    Cells(u32),
-    /// Blocks of cells.
-    Blocks,
-    /// Bodies.
-    Bodies(u32),
-    /// Parts of bodies, one workgroup each.
-    Parts,
-    /// Groups of the ledger.
-    Groups,
-    /// Agents.
-    Agents(u32),
-    /// Cells of agents, flock by flock.
-    AgentCells(u32),
-    /// Places of fluids and particles of all bodies.
-    Particles(u32),
-    /// Births of a frame.
-    Births(u32),
-    /// One workgroup.
-    One,
-}
-
-/// The kernels of a stage, in their order. `choose` stands before the first stage.
-pub fn kernels(stage: Stage) -> &'static [(&'static str, Over)] {
-    use Over::*;
-    match stage {
-        Stage::Drift => &[("drift_fluid", Fluids(128)), ("drift_bodies", Bodies(64)), ("follow", Slots(128))],
-        Stage::Cells => &[
-            ("clear", Cells(256)),
-            ("histogram", Moving(256)),
-            ("scan_blocks", Blocks),
-            ("scan_tops", One),
-            ("scan_add", Cells(256)),
-            ("scatter", Moving(256)),
-            ("gather", Moving(256)),
-        ],
-        Stage::Density => &[("density", Fluids(128))],
-        Stage::Divergence => &[],
-        Stage::Pressure => &[("pressure", Fluids(128))],
-        Stage::Boundary => &[("boundary", BodyParticles(128))],
-        Stage::Gradients => &[("gradients", Fluids(128))],
-        Stage::Forces => &[("forces_fluid", Fluids(128)), ("forces_body", BodyParticles(128)), ("hold", Fluids(128))],
-        Stage::Bodies => &[("sum_parts", Parts), ("sum_bodies", Bodies(64))],
-        Stage::Kick => &[("kick_fluid", Fluids(128)), ("kick_bodies", Bodies(64))],
-        Stage::Ledger => &[("tally", Groups), ("tally_agents", Agents(128)), ("total", One)],
-        Stage::Agents => &[
-            ("travel", Agents(64)),
-            ("crowd_clock", One),
-            ("agent_bounds", Agents(256)),
-            ("agent_grid", One),
-            ("agent_clear", AgentCells(256)),
-            ("agent_histogram", Agents(256)),
-            ("agent_scan_blocks", AgentCells(BLOCK)),
-            ("agent_scan_tops", One),
-            ("agent_scan_add", AgentCells(256)),
-            ("agent_scatter", Agents(256)),
-            ("agent_gather", Agents(256)),
-            ("decide", Agents(64)),
-            ("give", Particles(128)),
-        ],
-        Stage::Sources => &[("room", Births(64)), ("bear", One), ("drain", Fluids(128))],
-    }
-}
 
 /// The whole text for a scene.
 pub fn text(model: &Model) -> String {
@@ -140,7 +68,8 @@ pub fn text(model: &Model) -> String {
     let tension = model.fluids.iter().any(|f| f.cohesion > 0.0 || f.curvature > 0.0);
     let continuity = s.density == Density::Continuity;
     let bound_code = |bound| BOUNDS.iter().position(|&b| b == bound).unwrap_or(0);
-    let constant = model.dt_bounds.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(DtBound::Frame, |b| b.0);
+    let steady = model.dt_bounds.iter().filter(|b| !(model.implicit() && b.0 == DtBound::Contact));
+    let constant = steady.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(DtBound::Frame, |b| b.0);
     let mut text = String::new();
     let switches = [
         ("FLAT", flat),
@@ -163,6 +92,8 @@ pub fn text(model: &Model) -> String {
         ("WALLS_SLIP", s.walls_slip),
         ("LEAPFROG", s.integrator == Integrator::Leapfrog),
         ("SMOOTH", s.surface == Surface::Smooth),
+        ("IMPLICIT", model.implicit()),
+        ("PBF", s.pressure == Pressure::Pbf),
         ("FULL_DAMPING", s.damping == Damping::Full),
         ("RUBS", model.rubs()),
     ];
@@ -185,8 +116,15 @@ pub fn text(model: &Model) -> String {
         ("HAS_HOSES", hoses(model).count()),
         ("DRAINS", model.drains.len().max(1)),
         ("HAS_DRAINS", model.drains.len()),
+        ("NEAREST", model.flocks.iter().map(|f| f.neighbours).max().unwrap_or(0).max(1)),
+        ("JOINED", joined(model).count().max(1)),
+        ("HAS_JOINED", joined(model).count()),
+        ("HAS_JOINTS", model.joints.len()),
         ("BY_SOUND", bound_code(DtBound::Sound)),
         ("BY_FORCE", bound_code(DtBound::Force)),
+        ("BY_CONTACT", bound_code(DtBound::Contact)),
+        ("BY_FLOW", bound_code(DtBound::Flow)),
+        ("BY_LONGEST", bound_code(DtBound::Longest)),
         ("BY_TRAVEL", bound_code(DtBound::Travel)),
         ("BY_SCENE", bound_code(DtBound::Scene)),
         ("BY_FRAME", bound_code(DtBound::Frame)),
@@ -249,23 +187,15 @@ pub fn hoses(model: &Model) -> impl Iterator<Item = (Bore, DVec3, u32)> {
     model.sources.iter().filter_map(|s| s.bore.map(|bore| (bore, s.velocity, s.fluid)))
 }
 
+/// Pairs of bodies that joints hold together, so that they pass through each other.
+pub fn joined(model: &Model) -> impl Iterator<Item = [u32; 2]> {
+    let apart = |a: usize, b: usize| model.contacts[a].joined.contains(&(b as u32));
+    model.joints.iter().filter_map(move |j| j.b.filter(|&b| apart(j.a, b)).map(|b| [j.a as u32, b as u32]))
+}
+
 /// Whether some fluid has a lifetime.
 pub fn mortal(model: &Model) -> bool {
     model.fluids.iter().any(|f| f.lifetime.is_finite())
-}
-
-/// Whether a kernel has anything to do in a scene.
-pub fn wanted(name: &str, model: &Model, bodies: bool) -> bool {
-    match name {
-        "gradients" => model.wants_gradients(),
-        "room" | "bear" => !model.sources.is_empty(),
-        "drain" => !model.drains.is_empty() || mortal(model),
-        "hold" => hoses(model).next().is_some(),
-        "give" => model.flocks.iter().any(|f| f.matter.is_some()),
-        "travel" | "crowd_clock" | "decide" => !model.flocks.is_empty(),
-        name if name.contains("agent") => !model.flocks.is_empty(),
-        _ => bodies || !(name.contains("bod") || name.contains("part")),
-    }
 }
 
 /// Name of a kernel's functions in `laws/kernel.wgsl`.
@@ -392,6 +322,8 @@ mod tests {
             "[world]\ndimensions = 2",
             "[solver]\ndensity = \"continuity\"\nshifting = 1.0",
             "[solver]\nviscosity = \"mueller\"\nkernel = \"mueller\"\npressure_force = \"mueller\"",
+            "[solver]\npressure = \"dfsph\"\nxsph = 0.1",
+            "[solver]\npressure = \"pbf\"\ncoupling = \"spring\"",
             "[solver]\nvorticity = 0.1\nxsph = 0.1\ncoupling = \"spring\"\ndamping = \"full\"",
         ];
         for choice in choices {

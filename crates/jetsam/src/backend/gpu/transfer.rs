@@ -1,7 +1,8 @@
 //! Buffers of a world on the device, and the ways of a state there and back.
 
 use super::layout::{
-    self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, GONE, GpuBody, Rule, Sizes, Slot, Sums, Touch, three, with,
+    self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, GONE, GpuBody, Joint, NODE_BYTES, Rule, SOLVE_BYTES, SWEPT_BYTES,
+    Sizes, Slot, Sums, Touch, three, with,
 };
 use super::program::{hoses, mortal};
 use crate::gpu::{Gpu, GpuError};
@@ -85,7 +86,9 @@ impl Buffers {
             rigid,
             slots,
             bodies: state.bodies.body.len() as u32,
+            movers: state.bodies.body.iter().filter(|b| b.slots.start < state.bodies.rigid_slots).count() as u32,
             parts: parts.len() as u32,
+            rigid_parts: parts.iter().filter(|part| part[1] < rigid).count() as u32,
             cells: cells as u32,
             groups: (fluids + rigid).div_ceil(512).clamp(1, GROUPS),
             agents,
@@ -97,6 +100,7 @@ impl Buffers {
         let continuity = model.solver.density == Density::Continuity;
         let carried = model.solver.xsph > 0.0 || model.solver.shifting > 0.0 || continuity;
         let mirrored = if model.no_slip { slots as usize } else { 0 };
+        let rounds = |count: u32| if model.implicit() { count as usize } else { 0 };
         let make = |what: &'static str, count: usize, size: usize| storage(gpu, what, count, size);
         let buffers = vec![
             uniform(gpu, &layout::constants(model, sizes))?,
@@ -123,7 +127,7 @@ impl Buffers {
             make("sums of groups", (sizes.groups + agents.div_ceil(128)) as usize, size_of::<Sums>())?,
             make("statistics", logged + 1, size_of::<Sums>())?,
             make("births", listed, size_of::<Birth>())?,
-            make("forces of hoses", fluid_or(hoses(model).next().is_some()), 16)?,
+            make("forces of hoses", fluid_or(hoses(model).next().is_some()), 32)?,
             make("agents", sizes.agents as usize, size_of::<Agent>())?,
             make("agents before the sort", sizes.agents as usize, size_of::<Agent>())?,
             make("cells of agents", sizes.agent_cells as usize + 2, 4)?,
@@ -132,6 +136,15 @@ impl Buffers {
             make("blocks of cells of agents", ((sizes.agent_cells + 2).div_ceil(BLOCK)) as usize, 4)?,
             make("flocks", 1, size_of::<Crowd>() + model.flocks.len() * size_of::<Rule>())?,
             make("slips of contacts", 2 * state.bodies.slips.len(), size_of::<layout::Slips>())?,
+            make("implicit pressure", 1, SOLVE_BYTES)?,
+            make("bodies under implicit pressure", rounds(sizes.bodies), SWEPT_BYTES)?,
+            make("places in rounds", rounds(fluids + rigid), 16)?,
+            make("accelerations in rounds", rounds(fluids + rigid), 16)?,
+            make("nodes", rounds(fluids), NODE_BYTES)?,
+            make("shares", rounds(fluids), 16)?,
+            make("sums of rounds", rounds(fluids.div_ceil(128)), 16)?,
+            make("forces of shares", rounds(slots), 16)?,
+            make("joints", model.joints.len(), size_of::<Joint>())?,
         ];
         let buffers = Self { all: buffers };
         buffers.fill(gpu, model, state, &walls, &parts, sizes);
@@ -162,6 +175,7 @@ impl Buffers {
         write(12, 0, bytemuck::cast_slice(&layout::slots(state, place)));
         write(15, 0, bytemuck::cast_slice(parts));
         write(25, 0, bytemuck::cast_slice(&layout::agents(model, state)));
+        write(41, 0, bytemuck::cast_slice(&layout::joints(model)));
         write(31, 0, &layout::crowd(model, state, sizes));
         write(32, 0, bytemuck::cast_slice(&b.slips.iter().map(layout::slips).collect::<Vec<_>>()));
         if !p.carry.is_empty() {
@@ -260,6 +274,11 @@ impl Buffers {
     /// Bodies.
     pub fn bodies(&self) -> &wgpu::Buffer {
         &self.all[11]
+    }
+
+    /// What implicit pressure does to bodies.
+    pub fn swept(&self) -> &wgpu::Buffer {
+        &self.all[34]
     }
 
     /// Statistics of steps: the last, then one a step.

@@ -1,0 +1,357 @@
+// Rounds of implicit pressure (E9), the twin of implicit.rs and of backend/cpu/implicit.rs. As many rounds are queued as steps before
+// needed; once a solve is done, the rest of them do nothing. Where they do not suffice `close` halts the queue, and the host adds more.
+
+// solve.phase: rounds are made; no more are needed; what follows them is made; nothing is left to do.
+const ROUNDS: u32 = 0u;
+const DONE: u32 = 1u;
+const ENDING: u32 = 2u;
+const OVER: u32 = 3u;
+// solve.number of DFSPH; that of PBF is its turn.
+const VELOCITIES: u32 = 0u;
+const PLACES: u32 = 1u;
+// Jacobi's factor (Bender and Koschier 2015).
+const OMEGA: f32 = 0.5;
+// An error so many times the least so far says that rounds do not converge.
+const WORSE: f32 = 10.0;
+// How often PBF finds the vectors to neighbours anew in a step.
+const TURNS: u32 = 3u;
+
+fn in_round() -> bool { return clock.running != 0u && solve.phase == ROUNDS; }
+fn ended() -> bool { return clock.running != 0u && solve.phase == ENDING; }
+fn pushes() -> bool { return in_round() || ended(); }
+// Places begin without shares: there is nothing to push yet.
+fn nothing_yet() -> bool { return !PBF && solve.number == PLACES && solve.iterations == 0u && solve.phase == ROUNDS; }
+
+fn begin(number: u32) {
+  solve.number = number;
+  solve.iterations = 0u;
+  solve.residual = 0.0;
+  solve.pace = 1.0;
+  solve.momentum = 0.0;
+  solve.best = 3.4e38;
+  solve.omega = OMEGA / (clock.dt * clock.dt);
+  solve.phase = select(OVER, ROUNDS, live_fluid() > 0u && clock.dt > 0.0);
+}
+
+// A solve begins: of velocities, of places, of the turns of PBF.
+@compute @workgroup_size(1)
+fn begin_velocities() {
+  if (clock.running == 0u) { return; }
+  solve.said = vec4<f32>(0.0);
+  solve.phase = ENDING;   // links are made now
+}
+@compute @workgroup_size(1)
+fn velocities() { if (clock.running != 0u) { begin(VELOCITIES); } }
+@compute @workgroup_size(1)
+fn begin_places() { if (clock.running != 0u) { begin(PLACES); } }
+@compute @workgroup_size(1)
+fn begin_turns() {
+  if (clock.running == 0u) { return; }
+  solve.said = vec4<f32>(0.0);
+  solve.turn = 0u;
+  solve.phase = ENDING;
+}
+
+var<workgroup> judged: array<vec2<f32>, 256>;
+// Sum of what all workgroups said.
+fn all_said(l: u32) -> vec2<f32> {
+  var sum = vec2<f32>(0.0);
+  for (var k = l; k < (live_fluid() + 127u) / 128u; k += 256u) { sum += said[k].xy; }
+  judged[l] = sum;
+  workgroupBarrier();
+  for (var reach = 128u; reach > 0u; reach /= 2u) {
+    if (l < reach) { judged[l] += judged[l + reach]; }
+    workgroupBarrier();
+  }
+  return judged[0];
+}
+
+// Whether a turn of PBF is needed.
+@compute @workgroup_size(256)
+fn begin_turn(@builtin(local_invocation_index) l: u32) {
+  let above = all_said(l).x;
+  if (l != 0u || !ended()) { return; }
+  let turn = solve.turn;
+  if (turn > 0u) {
+    solve.said.y = above / f32(live_fluid());
+    if (solve.said.y <= m.rounds.x || solve.said.x >= m.rounds.z || turn == TURNS) { solve.phase = OVER; return; }
+  }
+  begin(turn);
+  if (solve.phase == ROUNDS) { solve.turn = turn + 1u; }
+}
+
+// Velocities of bodies' particles as the present forces but contacts will have made them when the step is over.
+@compute @workgroup_size(128)
+fn flow_of_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let s = number(g, n, l, 128u);
+  if (!ended() || s >= m.count.y || slots[s].place == GONE) { return; }
+  let b = bodies[slots[s].owner];
+  var v = b.v.xyz;
+  var omega = b.omega.xyz;
+  if (yields(b)) {
+    v += clock.dt * b.x.w * (b.force.xyz - b.force_contact.xyz);
+    omega = spin(b, b.q, b.l.xyz + clock.dt * (b.torque.xyz - b.torque_contact.xyz));
+  } else if (clock.drag > 0.0) {
+    v = vec3<f32>(0.0);
+    omega = v;
+  }
+  let at = slots[s].place;
+  flow[at] = vec4<f32>(v + cross(omega, turn(b.q, slots[s].offset.xyz)), 0.0);
+}
+// Whether fluids move a body now: not while a scene settles.
+fn yields(b: Body) -> bool { return clock.drag == 0.0 && moves(b) && b.stated.w == 0.0; }
+
+// How velocities (or accelerations) compress: sum (u_i - u_j) . e_ij.
+fn rate_of(i: u32) -> f32 {
+  let x = spot[i].xyz;
+  let limit = m.upper.w * m.upper.w;
+  var total = dot(nodes[i].all.xyz, flow[i].xyz);
+  for (var kind = FLUID; kind <= RIGID; kind += 1u) {
+    if (kind == RIGID && !COUPLED_BY_PRESSURE) { continue; }
+    var near = walk(x, kind);
+    while (next(&near)) {
+      let other = spot[near.at];
+      let d = wrap(other.xyz - x);
+      let r_sq = dot(d, d);
+      if (r_sq >= limit) { continue; }
+      total -= dot(flow[near.at].xyz, link_to(d, r_sq, select(other.w, m.per_cell.w, kind == FLUID)));
+    }
+  }
+  return total;
+}
+
+// What is wrong without the shares, in compression by the end of the step.
+@compute @workgroup_size(128)
+fn errors_of_velocities(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let i = number(g, n, l, 128u);
+  if (!ended() || i >= live_fluid()) { return; }
+  work[i].y = clock.dt * rate_of(i) + min(push[i].w - 1.0, 0.0);
+}
+// Places begin with what velocities have left, and without shares.
+@compute @workgroup_size(128)
+fn errors_of_places(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let i = number(g, n, l, 128u);
+  if (clock.running == 0u || i >= first_static()) { return; }
+  flow[i] = vec4<f32>(0.0);
+  if (i >= live_fluid()) { return; }
+  work[i] = vec4<f32>(0.0, work[i].y + max(push[i].w - 1.0, 0.0), 0.0, 0.0);
+  spot[i].w = 0.0;
+}
+
+// A round: accelerations of fluids by the shares of all.
+@compute @workgroup_size(128)
+fn accelerate(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let i = number(g, n, l, 128u);
+  if (!pushes() || nothing_yet() || i >= live_fluid()) { return; }
+  let own = spot[i];
+  let limit = m.upper.w * m.upper.w;
+  var total = vec3<f32>(0.0);
+  var near = walk(own.xyz, FLUID);
+  while (next(&near)) {
+    let other = spot[near.at];
+    let d = wrap(other.xyz - own.xyz);
+    let r_sq = dot(d, d);
+    if (r_sq >= limit) { continue; }
+    total += (own.w + other.w) * link_to(d, r_sq, m.per_cell.w);
+  }
+  let node = nodes[i];
+  total += 2.0 * own.w * node.solid.xyz + hold(own.w, m.contact.w) * node.pull.xyz;
+  flow[i] = vec4<f32>(-node.solid.w * total, 0.0);
+}
+
+// A round: force and torque of the shares on bodies, part by part in a fixed order.
+var<workgroup> thrusts: array<mat2x3<f32>, PART>;
+@compute @workgroup_size(128)
+fn thrust_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let k = g.y * n.x + g.x;
+  var own = mat2x3<f32>();
+  if (k < m.more.x && pushes()) {
+    let part = parts[k];
+    let s = part.first + l;
+    if (s < part.end && slots[s].place != GONE) {
+      let f = squeezed[slots[s].place - m.count.x].xyz;
+      own = mat2x3<f32>(f, cross(turn(bodies[part.body].q, slots[s].offset.xyz), f));
+    }
+  }
+  thrusts[l] = own;
+  workgroupBarrier();
+  for (var reach = PART / 2u; reach > 0u; reach /= 2u) {
+    if (l < reach) { thrusts[l] += thrusts[l + reach]; }
+    workgroupBarrier();
+  }
+  if (l == 0u && k < m.more.x && pushes()) {
+    part_sums[k].force = vec4<f32>(thrusts[0][0], 0.0);
+    part_sums[k].torque = vec4<f32>(thrusts[0][1], 0.0);
+  }
+}
+
+@compute @workgroup_size(64)
+fn thrust_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let k = number(g, n, l, 64u);
+  if (!pushes() || k >= select(m.movers.x, m.count.w, solve.phase == ENDING)) { return; }
+  let b = bodies[k];
+  var thrust = vec4<f32>(0.0);
+  var twist = vec4<f32>(0.0);
+  for (var p = b.counts.z; p < b.counts.z + b.counts.w; p += 1u) {
+    thrust += part_sums[p].force;
+    twist += part_sums[p].torque;
+  }
+  if (FLAT) { twist = vec4<f32>(0.0, twist.y, 0.0, 0.0); }
+  swept[k].thrust = thrust;
+  swept[k].twist = twist;
+  let give = yields(b) && COUPLED_BY_PRESSURE;
+  swept[k].push = select(vec4<f32>(0.0), b.x.w * thrust, give);
+  swept[k].spin = select(vec4<f32>(0.0), vec4<f32>(spin(b, b.q, twist.xyz), 0.0), give);
+}
+
+// A round: bodies' particles as their bodies are pushed.
+@compute @workgroup_size(128)
+fn push_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let s = number(g, n, l, 128u);
+  if (!pushes() || s >= m.count.y || slots[s].place == GONE) { return; }
+  let by = swept[slots[s].owner];
+  let arm = turn(bodies[slots[s].owner].q, slots[s].offset.xyz);
+  flow[slots[s].place] = vec4<f32>(by.push.xyz + cross(by.spin.xyz, arm), 0.0);
+}
+
+// A round: the rates of accelerations, and all shares relaxed by them.
+@compute @workgroup_size(128)
+fn relax(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let i = number(g, n, l, 128u);
+  var own = vec2<f32>(0.0);
+  if (in_round() && i < live_fluid()) { own = relax_one(i); }
+  judged[l] = own;
+  workgroupBarrier();
+  for (var reach = 64u; reach > 0u; reach /= 2u) {
+    if (l < reach) { judged[l] += judged[l + reach]; }
+    workgroupBarrier();
+  }
+  if (l == 0u && in_round()) { said[g.y * n.x + g.x] = vec4<f32>(judged[0], 0.0, 0.0); }
+}
+fn relax_one(i: u32) -> vec2<f32> {
+  var rate = 0.0;
+  if (!nothing_yet()) { rate = rate_of(i); }
+  let w = work[i];
+  let share = spot[i].w;
+  let answer = nodes[i].all.w;
+  let now = relaxed(share, w.y + clock.dt * clock.dt * rate, solve.omega / answer);
+  work[i] = vec4<f32>(now, w.y, rate, w.w);
+  spot[i].w = max(now + solve.momentum * (now - w.x), 0.0);
+  // what the share should still change by, in compression: of particles without pressure only the excess counts
+  return vec2<f32>(abs(now - share) * answer / solve.omega, (share - now) * (now - w.x) * answer);
+}
+
+// A round: whether it was the last, and how fast the next goes on.
+@compute @workgroup_size(256)
+fn judge(@builtin(local_invocation_index) l: u32) {
+  let sum = all_said(l);
+  if (l != 0u || !in_round()) { return; }
+  let velocities = !PBF && solve.number == VELOCITIES;
+  let tolerance = select(m.rounds.x, m.rounds.y, velocities);
+  var pace = 0.5 * (1.0 + sqrt(1.0 + 4.0 * solve.pace * solve.pace));
+  if (sum.y > 0.0) { pace = 1.0; }
+  let residual = sum.x / f32(live_fluid());
+  if (residual > WORSE * solve.best) {
+    // a body too light, or places too odd, for steps so long
+    pace = 1.0;
+    solve.omega *= 0.5;
+  }
+  solve.pace = pace;
+  solve.momentum = (pace - 1.0) / (0.5 * (1.0 + sqrt(1.0 + 4.0 * pace * pace)));
+  solve.best = min(solve.best, residual);
+  solve.iterations += 1u;
+  solve.residual = residual;
+  if (velocities) { solve.said = vec4<f32>(solve.said.xy, f32(solve.iterations), residual); }
+  else if (PBF) { solve.said.x += 1.0; }
+  else { solve.said = vec4<f32>(f32(solve.iterations), residual, solve.said.zw); }
+  clock.rounds[solve.number] = max(clock.rounds[solve.number], solve.iterations);
+  if (residual <= tolerance || f32(solve.iterations) >= m.rounds.z) { solve.phase = DONE; }
+}
+
+// After the rounds that were queued: on, or halt for more.
+@compute @workgroup_size(1)
+fn close() {
+  if (clock.running == 0u) { return; }
+  if (solve.phase == DONE) { solve.phase = ENDING; }
+  if (solve.phase == ROUNDS) {
+    clock.running = 0u;
+    clock.halted = 1u + solve.number;
+  }
+}
+
+@compute @workgroup_size(128)
+fn finish(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let i = number(g, n, l, 128u);
+  if (!ended() || i >= live_fluid()) { return; }
+  let w = work[i];
+  spot[i].w = w.x;
+  var sum = w.w;
+  if (PBF) { sum = select(w.w, 0.0, solve.turn == 1u) + w.x; }
+  work[i] = vec4<f32>(w.x, w.y + clock.dt * clock.dt * w.z, 0.0, sum);
+}
+
+// DFSPH: velocities that do not compress.
+@compute @workgroup_size(128)
+fn take_velocities(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let i = number(g, n, l, 128u);
+  if (!ended() || i >= live_fluid()) { return; }
+  records[i].v = vec4<f32>(records[i].v.xyz + clock.dt * flow[i].xyz, spot[i].w);
+}
+// Bodies are pushed so throughout the step.
+@compute @workgroup_size(64)
+fn load_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let k = number(g, n, l, 64u);
+  if (!ended() || k >= m.count.w) { return; }
+  let by = swept[k];
+  swept[k].added = by.thrust;
+  swept[k].added_torque = by.twist;
+  bodies[k].force_fluid += by.thrust;
+  bodies[k].torque_fluid += by.twist;
+  if (bodies[k].stated.w == 0.0) {
+    bodies[k].force += by.thrust;
+    bodies[k].torque += by.twist;
+  }
+  if (!moves(bodies[k]) || bodies[k].stated.w > 0.0) { swept[k].impulse -= clock.dt * by.thrust; }
+}
+
+// PBF: particles moved by a turn's accelerations, bodies by its thrusts.
+@compute @workgroup_size(128)
+fn shift_fluid(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let i = number(g, n, l, 128u);
+  if (!ended() || i >= live_fluid()) { return; }
+  let dv = clock.dt * flow[i].xyz;
+  let r = records[i];
+  records[i] = Record(vec4<f32>(home_all(r.x.xyz + clock.dt * dv), r.x.w), vec4<f32>(r.v.xyz + dv, r.v.w));
+}
+@compute @workgroup_size(64)
+fn shift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let k = number(g, n, l, 64u);
+  if (!ended() || k >= m.count.w) { return; }
+  let dt = clock.dt;
+  var b = bodies[k];
+  let by = swept[k];
+  swept[k].added += by.thrust;
+  swept[k].added_torque += by.twist;
+  if (!moves(b) || b.stated.w > 0.0) { swept[k].impulse -= dt * by.thrust; }
+  if (!yields(b) || !COUPLED_BY_PRESSURE) { return; }
+  let p = kept(b.p_half.xyz, b.p_rest.xyz, dt * by.thrust.xyz);
+  let l_half = kept(b.l_half.xyz, b.l_rest.xyz, dt * by.twist.xyz);
+  let x = kept(b.x.xyz, b.rest.xyz, dt * dt * by.push.xyz);
+  bodies[k].p_half = vec4<f32>(p.sum, 0.0);
+  bodies[k].p_rest = vec4<f32>(p.rest, 0.0);
+  bodies[k].l_half = vec4<f32>(l_half.sum, 0.0);
+  bodies[k].l_rest = vec4<f32>(l_half.rest, 0.0);
+  bodies[k].p = b.p + dt * by.thrust;
+  bodies[k].v = b.v + dt * by.push;
+  bodies[k].l = b.l + dt * by.twist;
+  bodies[k].omega = vec4<f32>(spin(b, b.q, b.l.xyz + dt * by.twist.xyz), 0.0);
+  bodies[k].x = vec4<f32>(home_all(x.sum), b.x.w);
+  bodies[k].rest = vec4<f32>(x.rest, b.rest.w);
+  bodies[k].q = normalize(times(turned_by(dt * dt * by.spin.xyz), b.q));
+}
+// Slots follow their bodies where those are in the midst of a solve.
+@compute @workgroup_size(128)
+fn shift_slots(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let s = number(g, n, l, 128u);
+  if (ended() && s < m.count.y && clock.drag == 0.0) { follow_in_place(s); }
+}
