@@ -23,6 +23,8 @@ pub struct Frame {
     pub poses: Vec<(DVec3, DQuat)>,
     /// Agents, flock by flock.
     pub agents: Vec<Record>,
+    /// Identity of each agent; empty where particles are lent.
+    pub agent_id: Vec<u32>,
     /// The particles, where they are on a device already: the arrays above are empty then.
     #[cfg(feature = "gpu")]
     pub lent: Option<jetsam::backend::OnDevice>,
@@ -49,6 +51,7 @@ impl Frame {
         (self.first, self.count) = ([0; 3], [0; 3]);
         self.poses = bodies.iter().map(|b| (b.x, b.q)).collect();
         self.agents = agents;
+        self.agent_id.clear();
         self.lent = Some(lent);
     }
 
@@ -86,6 +89,7 @@ impl Frame {
         self.poses.clear();
         self.poses.extend(state.bodies.body.iter().map(|b| (b.x, b.q)));
         self.agents.clone_from(&state.agents.record);
+        self.agent_id.clone_from(&state.agents.id);
     }
 
     /// Range of a kind in the particle arrays.

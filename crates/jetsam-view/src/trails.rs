@@ -32,7 +32,7 @@ impl Trails {
         let particle = every(fluid.len());
         let particles = fluid.map(|i| ((false, frame.tag[i][0]), Vec3::from(frame.record[i].x)));
         let agent = every(frame.agents.len());
-        let agents = (0u32..).zip(&frame.agents).map(|(id, r)| ((true, id), Vec3::from(r.x)));
+        let agents = frame.agent_id.iter().zip(&frame.agents).map(|(id, r)| ((true, *id), Vec3::from(r.x)));
         let followed = particles.filter(|((_, id), _)| id.is_multiple_of(particle));
         let mut seen = BTreeMap::new();
         for (who, place) in followed.chain(agents.filter(|((_, id), _)| id.is_multiple_of(agent))) {
@@ -84,13 +84,14 @@ mod tests {
                 record: order.map(at).into(),
                 tag: order.map(|id| [id, 0]).into(),
                 count: [2, 0, 0],
-                agents: vec![Record { x: [2.0, (k % 5) as f32, 0.0], ..Record::default() }],
+                agents: order.map(at).into(),
+                agent_id: order.into(),
                 ..Frame::default()
             });
         }
         let lines = trails.lines(&show);
-        assert_eq!(lines.len(), 12);
+        assert_eq!(lines.len(), 16);
         assert!(lines.iter().all(|l| l.from.x == l.to.x && (l.to.y - l.from.y) == 1.0));
-        assert_eq!(trails.lines(&Show { periodic: [false; 3], ..show }).len(), 15);
+        assert_eq!(trails.lines(&Show { periodic: [false; 3], ..show }).len(), 20);
     }
 }
