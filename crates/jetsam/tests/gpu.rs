@@ -337,7 +337,6 @@ fn stages_agree(text: &str, before: usize) {
             }
         }
         let (a, b) = (cpu.ledger(), gpu.ledger());
-        println!("{a:?}\n{b:?}");
         let near = |what: &str, a: f64, b: f64, scale: f64| {
             assert!((a - b).abs() <= 1e-4 * scale.abs().max(1e-12), "{what}: {a} and {b}");
         };
@@ -395,7 +394,6 @@ fn a_hundred_steps_agree() {
             gpu.step(dt);
         }
         let (a, b) = (cpu.ledger(), gpu.ledger());
-        println!("{a:?}\n{b:?}");
         assert_eq!((a.fluid, a.lost, b.lost), (b.fluid, 0, 0));
         for (what, x, y) in [("kinetic", a.kinetic, b.kinetic), ("potential", a.potential, b.potential)] {
             assert!((x - y).abs() <= 1e-4 * (a.kinetic + a.potential), "{what}: {x} and {y}");
@@ -765,7 +763,6 @@ fn implicit_stages_agree_in(text: &str, before: usize) {
             compare_implicit(stage, cpu.download(), gpu.download());
         }
         let (a, b) = (cpu.ledger(), gpu.ledger());
-        println!("{a:?}\n{b:?}");
         assert_eq!(a.pressure.iterations, b.pressure.iterations);
         assert_eq!(a.divergence.iterations, b.divergence.iterations);
         assert_eq!((a.fluid, a.lost, a.left, a.put_back), (b.fluid, b.lost, b.left, b.put_back));
