@@ -92,7 +92,7 @@ fn kicked(rule: Rule, v: vec3<f32>, steering: vec3<f32>, dt: f32) -> vec3<f32> {
   var fastest = rule.limits.z;
   if (rule.matter.x > 0.0) { slowest = min(slowest, speed); fastest = max(fastest, speed); }
   let t = turn_of(rule.sense.z * dt);
-  return moved(v, steering, dt, direction_of(v), t.x, t.y, slowest, fastest);
+  return moved(v, steering, dt, t.x, t.y, slowest, fastest);
 }
 
 // Agents move, and those of mass feel what is around them.

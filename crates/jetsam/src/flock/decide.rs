@@ -6,10 +6,11 @@ use super::model::FlockConstants;
 use super::motion::turn;
 use super::nearest::{Among, Near, nearest};
 use super::obstacles;
-use super::perception::{Sorted, Source, Tile};
+use super::perception::{Around, around};
 use super::stage::World;
-use super::sums::{self, Sums};
+use super::sums::{self, Group, Run, Sums, lane};
 use crate::interact::cells::{Cells, Grid};
+use crate::interact::lanes::LANES;
 use crate::laws::flock;
 use crate::random::uniform;
 use crate::scene::{FlockModel, Relation, Wall};
@@ -32,8 +33,6 @@ pub struct View<'a> {
     /// Where they begin, flock by flock.
     pub cells: &'a [Cells],
     /// All agents.
-    pub sorted: &'a Sorted,
-    /// All agents.
     pub records: &'a [Record],
     /// Their ids.
     pub id: &'a [u32],
@@ -43,12 +42,12 @@ pub struct View<'a> {
     pub clock: &'a [Clock],
 }
 
-/// Tiles of a thread.
+/// Scratch of a thread.
 #[derive(Default)]
 pub struct Scratch {
-    tiles: Vec<Tile>,
+    runs: Vec<Around>,
     nearest: Vec<Near>,
-    sums: Vec<Sums>,
+    neighbours: Vec<Record>,
 }
 
 thread_local! {
@@ -67,7 +66,7 @@ const SWING: u64 = 0;
 const AXIS: u64 = 2;
 const WANDER: u64 = 5;
 
-/// Decides for the agents `members` of flock `own`.
+/// Decides for the agents `members` of flock `own`, sixteen of a row of cells at a time.
 #[inline(always)]
 pub fn chunk<S: Simd>(
     simd: S,
@@ -77,44 +76,31 @@ pub fn chunk<S: Simd>(
     members: Range<usize>,
     next: &mut [[f32; 3]],
 ) {
-    let flocks = &view.world.model.flocks;
-    let rule = &flocks[own];
-    scratch.tiles.resize_with(flocks.len().max(scratch.tiles.len()), Tile::default);
-    scratch.sums.clear();
-    let mut row = members.start;
-    while row < members.end {
-        let begin = cell_of(view, row);
-        let cells = view.cells[own].row(begin[0], view.grid.cells[0] - 1, begin[1], begin[2]);
-        let row_end = members.end.min(rule.first + cells.end);
-        let last = cell_of(view, row_end - 1)[0];
-        for j in (0..flocks.len()).filter(|&j| looks_at(rule, j)) {
-            let source = Source { grid: view.grid, cells: &view.cells[j], first: flocks[j].first, sorted: view.sorted };
-            scratch.tiles[j].pack(simd, source, begin, last, far(view, rule, j));
-        }
-        while row < row_end {
-            let cell = cell_of(view, row);
-            for j in (0..flocks.len()).filter(|&j| looks_at(rule, j)) {
-                let slab = (cell[0] - begin[0]) as usize;
-                scratch.tiles[j].look(slab..slab + 2 * far(view, rule, j)[0] as usize + 1);
+    let rule = &view.world.model.flocks[own];
+    let errands = has_errands(view, rule);
+    let mut begin = members.start;
+    while begin < members.end {
+        let cell = view.grid.coordinates(view.records[begin].x);
+        let row = view.cells[own].row(cell[0], view.grid.cells[0] - 1, cell[1], cell[2]);
+        let group = begin..members.end.min(begin + LANES).min(rule.first + row.end);
+        let me = Group::new(&view.records[group.clone()]);
+        let sums = perceive(simd, scratch, view, own, &me, cell, group.clone());
+        let next = &mut next[group.start - members.start..group.end - members.start];
+        begin = group.end;
+        match rule.model {
+            FlockModel::Reynolds => steer(view, own, &me, group, &sums, errands, next),
+            FlockModel::Couzin => {
+                for (l, (i, next)) in group.zip(next).enumerate() {
+                    *next = zones(view, rule, own, i, &sums, l).to_array();
+                }
             }
-            let cell_end = row_end.min(rule.first + view.cells[own].end(cell));
-            for i in row..cell_end {
-                let sums = perceive(simd, scratch, view, own, i);
-                scratch.sums.push(sums);
+            FlockModel::Vicsek => {
+                for (l, (i, next)) in group.zip(next).enumerate() {
+                    *next = noisy_mean(view, rule, own, i, &sums, l).to_array();
+                }
             }
-            row = cell_end;
         }
     }
-    // by itself: decisions of several agents overlap in the processor
-    for ((i, sums), next) in members.zip(&scratch.sums).zip(next) {
-        *next = decide(view, own, i, sums).to_array();
-    }
-}
-
-/// The cell of agent `i`.
-#[inline(always)]
-fn cell_of(view: View, i: usize) -> [i32; 3] {
-    view.grid.coordinates(view.records[i].x)
 }
 
 /// Whether agents look for those of flock `other` within a radius.
@@ -134,33 +120,46 @@ fn far(view: View, rule: &FlockConstants, other: usize) -> [i32; 3] {
     [(reach / x).ceil() as i32, (reach / y).ceil() as i32, (reach / z).ceil() as i32]
 }
 
-/// Sums over all that agent `i` of flock `own` perceives.
+/// Sums over all that the agents `group` of flock `own` perceive, of whom the first is in `cell`.
 #[inline(always)]
-fn perceive<S: Simd>(simd: S, scratch: &mut Scratch, view: View, own: usize, i: usize) -> Sums {
-    let rule = &view.world.model.flocks[own];
-    let me = &view.records[i];
-    let mut total = Sums::default();
-    for (j, relation) in rule.relations.iter().enumerate() {
-        match relation {
-            Relation::School if rule.neighbours == 0 => {
-                sums::school(simd, me, rule, &scratch.tiles[j], false, &mut total);
+fn perceive<S: Simd>(
+    simd: S,
+    scratch: &mut Scratch,
+    view: View,
+    own: usize,
+    me: &Group,
+    cell: [i32; 3],
+    group: Range<usize>,
+) -> Sums {
+    let flocks = &view.world.model.flocks;
+    let rule = &flocks[own];
+    let mut sums = Sums::default();
+    let last = view.grid.coordinates(view.records[group.end - 1].x)[0];
+    for j in (0..flocks.len()).filter(|&j| looks_at(rule, j)) {
+        around(view.grid, &view.cells[j], flocks[j].first, cell, last, far(view, rule, j), &mut scratch.runs);
+        for (range, shift) in &scratch.runs {
+            let run = Run { agents: &view.records[range.clone()], shift: *shift };
+            match rule.relations[j] {
+                Relation::School => sums::school(simd, me, rule, run, false, &mut sums),
+                Relation::Flee => sums::sight(me, rule, run, &mut sums.fled),
+                Relation::Chase => sums::sight(me, rule, run, &mut sums.chased),
+                Relation::Ignore => {}
             }
-            Relation::Flee => total.fled += sums::seen(simd, me, rule, &scratch.tiles[j]),
-            Relation::Chase => total.chased += sums::seen(simd, me, rule, &scratch.tiles[j]),
-            Relation::School | Relation::Ignore => {}
         }
     }
     if rule.neighbours > 0 {
-        pick_nearest(simd, view, own, i, scratch);
-        sums::school(simd, me, rule, &scratch.tiles[own], true, &mut total);
-        total.add_oneself(me);
+        for (l, i) in group.enumerate() {
+            pick_nearest(view, own, i, scratch);
+            let run = Run { agents: &scratch.neighbours, shift: [0.0; 3] };
+            sums::school(simd, &me.only(l), rule, run, true, &mut sums);
+        }
+        sums.add_oneself(me);
     }
-    total
+    sums
 }
 
-/// Packs the topological neighbours of agent `i` (E25) into the tile of its own flock.
-#[inline(always)]
-fn pick_nearest<S: Simd>(simd: S, view: View, own: usize, i: usize, scratch: &mut Scratch) {
+/// The topological neighbours of agent `i` (E25), shifted into place.
+fn pick_nearest(view: View, own: usize, i: usize, scratch: &mut Scratch) {
     let flocks = &view.world.model.flocks;
     let rule = &flocks[own];
     let schools = rule.relations.iter().zip(view.cells).zip(flocks);
@@ -168,18 +167,11 @@ fn pick_nearest<S: Simd>(simd: S, view: View, own: usize, i: usize, scratch: &mu
         schools.filter(|((r, _), _)| **r == Relation::School).map(|((_, c), f)| (c, f.first)).collect();
     let among = Among { grid: view.grid, flocks: &among, records: view.records, id: view.id };
     nearest(among, i, rule.neighbours, rule.view, &mut scratch.nearest);
-    let found = scratch.nearest.iter().map(|n| (n.index, n.shift));
-    scratch.tiles[own].pick(simd, view.sorted, found);
-}
-
-#[inline(always)]
-fn decide(view: View, own: usize, i: usize, sums: &Sums) -> Vec3 {
-    let rule = &view.world.model.flocks[own];
-    match rule.model {
-        FlockModel::Reynolds => steer(view, own, i, sums),
-        FlockModel::Couzin => zones(view, rule, own, i, sums),
-        FlockModel::Vicsek => noisy_mean(view, rule, own, i, sums),
-    }
+    scratch.neighbours.clear();
+    scratch.neighbours.extend(scratch.nearest.iter().map(|n| {
+        let r = view.records[n.index];
+        Record { x: (Vec3::from(r.x) + Vec3::from(n.shift)).to_array(), ..r }
+    }));
 }
 
 /// A vector of the laws as glam's.
@@ -190,20 +182,58 @@ macro_rules! vec3 {
     }};
 }
 
-/// E22, E26: all steering of a Reynolds agent (m/s^2).
+/// E22: steering (m/s^2) of the Reynolds agents `group`.
 #[inline(always)]
-fn steer(view: View, own: usize, i: usize, sums: &Sums) -> Vec3 {
+fn steer(view: View, own: usize, me: &Group, group: Range<usize>, sums: &Sums, errands: bool, next: &mut [[f32; 3]]) {
+    let rule = &view.world.model.flocks[own];
+    let (w, u) = (&rule.weights, &rule.limits);
+    let mut total = [[0.0; LANES]; 3];
+    if errands {
+        for (l, i) in group.enumerate() {
+            [total[0][l], total[1][l], total[2][l]] = errand(view, own, i, sums, l).to_array();
+        }
+    }
+    let plane = view.world.model.dimensions == 2;
+    for l in 0..LANES {
+        let v = [me.v[0][l], me.v[1][l], me.v[2][l]];
+        let aligned = sums.aligned[l].max(1.0);
+        // oneself is no place to be drawn to
+        let drawn = (sums.drawn[l] - 1.0).max(1.0);
+        let mean = [sums.velocity[0][l] / aligned, sums.velocity[1][l] / aligned, sums.velocity[2][l] / aligned];
+        let place = [sums.place[0][l] / drawn, sums.place[1][l] / drawn, sums.place[2][l] / drawn];
+        let align = flock::alignment(v, mean, w.alignment);
+        let cohere = flock::cohere(place, w.cohesion);
+        let cruise = flock::cruise(v, u.speed, w.cruise);
+        let x = total[0][l] + w.separation * sums.repelled[0][l] + align.x + cohere.x + cruise.x;
+        let y = total[1][l] + w.separation * sums.repelled[1][l] + align.y + cohere.y + cruise.y;
+        let z = total[2][l] + w.separation * sums.repelled[2][l] + align.z + cohere.z + cruise.z;
+        let a = flock::limited([x, if plane { 0.0 } else { y }, z], u.acceleration);
+        (total[0][l], total[1][l], total[2][l]) = (a.x, a.y, a.z);
+    }
+    for (l, next) in next.iter_mut().enumerate() {
+        *next = [total[0][l], total[1][l], total[2][l]];
+    }
+}
+
+/// Whether Reynolds agents have more to do than to school.
+fn has_errands(view: View, rule: &FlockConstants) -> bool {
+    let w = &rule.weights;
+    rule.goal.is_some()
+        || rule.leader.is_some()
+        || rule.keep_to_fluids
+        || rule.flee_bodies
+        || rule.flee_fluids
+        || w.wander > 0.0
+        || w.avoid > 0.0 && (view.world.has_bodies() || view.grid.period.contains(&0.0))
+        || rule.relations.iter().any(|r| matches!(r, Relation::Flee | Relation::Chase))
+}
+
+/// E22, E26: steering of a Reynolds agent (m/s^2) that has nothing to do with those it schools with; `l` is its lane.
+fn errand(view: View, own: usize, i: usize, sums: &Sums, l: usize) -> Vec3 {
     let rule = &view.world.model.flocks[own];
     let me = &view.records[i];
     let (w, v, u) = (&rule.weights, me.v, &rule.limits);
-    let mut a = w.separation * sums.repelled;
-    let mean = sums.velocity / sums.aligned;
-    a += vec3!(flock::alignment(v, mean.to_array(), w.alignment));
-    // oneself is no place to be drawn to
-    if sums.drawn > 1.0 {
-        a += vec3!(flock::cohere((sums.place / (sums.drawn - 1.0)).to_array(), w.cohesion));
-    }
-    a += vec3!(flock::cruise(v, u.speed, w.cruise));
+    let mut a = Vec3::ZERO;
     if let Some((goal, slow)) = rule.goal {
         let d = view.world.apart(me.x, goal.to_array());
         a += vec3!(flock::seek(v, d.to_array(), u.fastest, slow, w.seek));
@@ -214,9 +244,10 @@ fn steer(view: View, own: usize, i: usize, sums: &Sums) -> Vec3 {
     if let Some((leader, behind)) = rule.leader {
         a += follow(view, rule, leader, behind, me);
     }
-    a += escape(view, rule, me, sums);
-    if sums.chased != Vec3::ZERO {
-        a += vec3!(flock::seek(v, sums.chased.to_array(), u.fastest, 0.0, w.chase));
+    a += escape(view, rule, me, lane(&sums.fled, l));
+    let chased = lane(&sums.chased, l);
+    if chased != Vec3::ZERO {
+        a += vec3!(flock::seek(v, chased.to_array(), u.fastest, 0.0, w.chase));
     }
     a += w.avoid * keep_in(view, rule, me);
     if rule.keep_to_fluids {
@@ -225,23 +256,20 @@ fn steer(view: View, own: usize, i: usize, sums: &Sums) -> Vec3 {
     if w.avoid > 0.0 && view.world.has_bodies() {
         a += w.avoid * obstacles::ahead(view.world, rule, me);
     }
-    if view.world.model.dimensions == 2 {
-        a.y = 0.0;
-    }
-    vec3!(flock::limited(a.to_array(), u.acceleration))
+    a
 }
 
 /// Fleeing from other flocks, bodies and fluids (m/s^2).
 #[inline(always)]
-fn escape(view: View, rule: &FlockConstants, me: &Record, sums: &Sums) -> Vec3 {
+fn escape(view: View, rule: &FlockConstants, me: &Record, fled: Vec3) -> Vec3 {
     let mut total = Vec3::ZERO;
     let mut from = |toward: Vec3, closeness: f32| {
         let away = -toward.normalize_or_zero();
         total += vec3!(flock::flee(me.v, away.to_array(), rule.limits.fastest, closeness, rule.weights.flee));
     };
-    if sums.fled != Vec3::ZERO {
+    if fled != Vec3::ZERO {
         // 1 / r of the nearest is at most the size of the sum
-        from(sums.fled, flock::side(1.0 / sums.fled.length(), rule.sight).max(0.1));
+        from(fled, flock::side(1.0 / fled.length(), rule.sight).max(0.1));
     }
     if rule.flee_bodies {
         for (body, radius) in view.world.rigid() {
@@ -347,10 +375,10 @@ fn swung(view: View, rule: &FlockConstants, direction_of: Vec3, angle: f64, coun
     vec3!(flock::swung(direction_of.to_array(), axis.to_array(), cosine as f32, sine as f32))
 }
 
-/// E23.
-fn zones(view: View, rule: &FlockConstants, own: usize, i: usize, sums: &Sums) -> Vec3 {
+/// E23, for the agent of lane `l`.
+fn zones(view: View, rule: &FlockConstants, own: usize, i: usize, sums: &Sums, l: usize) -> Vec3 {
     let heading = Vec3::from(view.records[i].v).normalize_or_zero();
-    let [r, o, a] = [sums.repelled, sums.velocity, sums.place].map(|v| v.to_array());
+    let [r, o, a] = [&sums.repelled, &sums.velocity, &sums.place].map(|v| lane(v, l).to_array());
     let mut wanted = vec3!(flock::couzin(r, o, a, heading.to_array()));
     if rule.noise > 0.0 {
         let count = counter(view.id[i], view.clock[own].decisions);
@@ -364,10 +392,10 @@ fn zones(view: View, rule: &FlockConstants, own: usize, i: usize, sums: &Sums) -
     new.normalize_or_zero() * rule.limits.speed
 }
 
-/// E24.
-fn noisy_mean(view: View, rule: &FlockConstants, own: usize, i: usize, sums: &Sums) -> Vec3 {
+/// E24, for the agent of lane `l`.
+fn noisy_mean(view: View, rule: &FlockConstants, own: usize, i: usize, sums: &Sums, l: usize) -> Vec3 {
     let heading = Vec3::from(view.records[i].v).normalize_or_zero();
-    let mean = sums.velocity.try_normalize().unwrap_or(heading);
+    let mean = lane(&sums.velocity, l).try_normalize().unwrap_or(heading);
     let count = counter(view.id[i], view.clock[own].decisions);
     let angle = rule.noise * (uniform(rule.seed, SWING, count) - 0.5);
     let wanted = swung(view, rule, mean, angle, count);

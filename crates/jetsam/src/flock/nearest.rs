@@ -115,7 +115,7 @@ mod tests {
     fn lists(x: &[[f32; 3]], walls: Wall, width: f64, k: usize) -> (Vec<Vec<u32>>, Vec<Vec<u32>>) {
         let domain = Grid::new(DVec3::ZERO, DVec3::ONE, [walls; 3], 3, width, 0.0);
         let records: Vec<Record> = x.iter().map(|&x| Record { x, ..Record::default() }).collect();
-        let grid = grid_about(&domain, &records, 3, width);
+        let grid = grid_about(&domain, &records, 3, [width; 3]);
         let mut cells = Cells::default();
         let n = cells.sort(&grid, &records, None);
         assert_eq!(n, records.len());

@@ -122,7 +122,7 @@ struct Within {
 
 impl Within {
     fn new(model: &Model, flock: &FlockConstants, records: &[Record]) -> Self {
-        let grid = grid_about(&model.grid, records, model.dimensions, 1.0001 * f64::from(flock.radius));
+        let grid = grid_about(&model.grid, records, model.dimensions, [1.0001 * f64::from(flock.radius); 3]);
         let mut cells = Cells::default();
         let inside = cells.sort(&grid, records, None);
         let order: Vec<u32> = cells.order[..inside].iter().map(|o| o.load(Relaxed)).collect();

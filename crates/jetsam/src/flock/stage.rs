@@ -4,13 +4,12 @@ use super::coupling::Coupling;
 use super::decide::{self, View, with_scratch};
 use super::model::FlockConstants;
 use super::motion::{self, Part};
-use super::perception::{Sorted, grid_about};
+use super::perception::grid_about;
 use crate::integrate::{Advance, bodies};
 use crate::interact::CHUNK;
 use crate::interact::cells::{Cells, Grid};
 use crate::model::Model;
 use crate::state::{Agents, Body, Kind, Particles, Record};
-use bytemuck::Zeroable;
 use fearless_simd::{Level, dispatch};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -61,7 +60,6 @@ pub struct Crowd {
     cells: Vec<Cells>,
     inside: Vec<usize>,
     grid: Option<Grid>,
-    sorted: Sorted,
     coupling: Coupling,
     spare: Agents,
     /// Momentum that agents took by themselves in this step (kg m/s).
@@ -88,7 +86,7 @@ impl Crowd {
         }
         let first = bodies::first_kick(world.model.solver.integrator, advance.dt);
         if advance.dt > 0.0 {
-            self.impulse = travel(world, agents, advance.dt, first);
+            self.impulse = travel(level, world, agents, advance.dt, first);
         }
         self.coupling.feel(world, agents, advance.dt, first);
         let due: Vec<bool> = flocks.iter().zip(&agents.clock).map(|(f, c)| c.wait <= SOON * f.tau).collect();
@@ -107,23 +105,22 @@ impl Crowd {
         self.inside.clear();
         self.nonfinite = 0;
         let spare = &mut self.spare;
+        spare.record.resize(agents.record.len(), Record::default());
+        spare.id.resize(agents.id.len(), 0);
+        spare.next.resize(agents.next.len(), [0.0; 3]);
+        spare.rest.resize(agents.rest.len(), [0.0; 3]);
+        spare.force.resize(agents.force.len(), [0.0; 3]);
         for (flock, cells) in model.flocks.iter().zip(&mut self.cells) {
             let range = flock.range();
             self.inside.push(cells.sort(&grid, &agents.record[range.clone()], Some(&agents.id[range.clone()])));
             self.nonfinite += cells.nonfinite;
-            let order = &cells.order[..flock.count];
-            permute(&agents.record, &mut spare.record, range.clone(), order);
-            permute(&agents.id, &mut spare.id, range.clone(), order);
-            permute(&agents.next, &mut spare.next, range.clone(), order);
-            permute(&agents.rest, &mut spare.rest, range.clone(), order);
-            permute(&agents.force, &mut spare.force, range, order);
+            arrange(agents, spare, range, &cells.order[..flock.count]);
         }
         std::mem::swap(&mut spare.record, &mut agents.record);
         std::mem::swap(&mut spare.id, &mut agents.id);
         std::mem::swap(&mut spare.next, &mut agents.next);
         std::mem::swap(&mut spare.rest, &mut agents.rest);
         std::mem::swap(&mut spare.force, &mut agents.force);
-        self.sorted.fill(&agents.record);
         self.grid = Some(grid);
     }
 
@@ -143,7 +140,6 @@ impl Crowd {
             grid,
             width: sides(grid),
             cells: &self.cells,
-            sorted: &self.sorted,
             records: &agents.record,
             id: &agents.id,
             leaders: &leaders,
@@ -161,21 +157,23 @@ impl Crowd {
         }
     }
 
-    /// Width of the cells (m): as far as those of the largest flock perceive each other. For topological neighbours, two a cell.
-    fn width(&self, model: &Model, agents: &Agents) -> f64 {
+    /// Sides of the cells (m): as far as those of the largest flock perceive each other, half of it along rows, which groups of sixteen share.
+    /// For topological neighbours, two a cell.
+    fn width(&self, model: &Model, agents: &Agents) -> [f64; 3] {
         let largest = model.flocks.iter().max_by_key(|f| f.count);
-        let mut width = largest.filter(|f| f.neighbours == 0).map_or(0.0, |f| 1.0001 * f64::from(f.radius));
-        if width == 0.0 {
-            let mut extent = [f32::INFINITY, f32::NEG_INFINITY];
-            for r in &agents.record {
-                for a in 0..3 {
-                    extent = [extent[0].min(r.x[a]), extent[1].max(r.x[a])];
-                }
-            }
-            let per_axis = (agents.record.len() as f64 / 2.0).powf(1.0 / f64::from(model.dimensions)).max(1.0);
-            width = f64::from(extent[1] - extent[0]) / per_axis;
+        let reach = largest.filter(|f| f.neighbours == 0).map_or(0.0, |f| 1.0001 * f64::from(f.radius));
+        if reach > 0.0 && reach.is_finite() {
+            return [0.5 * reach, reach, reach];
         }
-        if width.is_finite() && width > 0.0 { width } else { 1.0 }
+        let mut extent = [f32::INFINITY, f32::NEG_INFINITY];
+        for r in &agents.record {
+            for a in 0..3 {
+                extent = [extent[0].min(r.x[a]), extent[1].max(r.x[a])];
+            }
+        }
+        let per_axis = (agents.record.len() as f64 / 2.0).powf(1.0 / f64::from(model.dimensions)).max(1.0);
+        let width = f64::from(extent[1] - extent[0]) / per_axis;
+        [if width.is_finite() && width > 0.0 { width } else { 1.0 }; 3]
     }
 }
 
@@ -185,22 +183,27 @@ fn sides(grid: &Grid) -> [f32; 3] {
     grid.inverse.map(|i| 0.99995 / i)
 }
 
-/// Brings the agents `range` of an array into a new order; an array that is not used stays so.
-fn permute<T: Copy + Zeroable + Send + Sync>(from: &[T], to: &mut Vec<T>, range: Range<usize>, order: &[AtomicU32]) {
-    to.resize(from.len(), T::zeroed());
-    if from.is_empty() {
-        return;
-    }
-    let (from, to) = (&from[range.clone()], &mut to[range]);
-    to.par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK)).for_each(|(to, order)| {
-        for (to, at) in to.iter_mut().zip(order) {
-            *to = from[at.load(Relaxed) as usize];
+/// Puts the agents `range` into a new order, in one pass: `to` has arrays of the same lengths.
+fn arrange(from: &Agents, to: &mut Agents, range: Range<usize>, order: &[AtomicU32]) {
+    let first = range.start;
+    let record = to.record[range.clone()].par_chunks_mut(CHUNK).zip(to.id[range.clone()].par_chunks_mut(CHUNK));
+    let next = to.next[range.clone()].par_chunks_mut(CHUNK).zip(to.rest[range.clone()].par_chunks_mut(CHUNK));
+    order.par_chunks(CHUNK).zip(record.zip(next)).for_each(|(order, ((record, id), (next, rest)))| {
+        for (k, at) in order.iter().enumerate() {
+            let at = first + at.load(Relaxed) as usize;
+            (record[k], id[k], next[k], rest[k]) = (from.record[at], from.id[at], from.next[at], from.rest[at]);
         }
     });
+    if !from.force.is_empty() {
+        let force = to.force[range].par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK));
+        force.for_each(|(to, order)| {
+            to.iter_mut().zip(order).for_each(|(to, at)| *to = from.force[first + at.load(Relaxed) as usize]);
+        });
+    }
 }
 
 /// Moves all agents, after a kick of `first` (s) by what they met; returns the momentum that they took by themselves (kg m/s).
-fn travel(world: &World, agents: &mut Agents, dt: f64, first: f64) -> DVec3 {
+fn travel(level: Level, world: &World, agents: &mut Agents, dt: f64, first: f64) -> DVec3 {
     let mut impulse = DVec3::ZERO;
     let Agents { record, next, rest, force, clock, .. } = agents;
     for (flock, clock) in world.model.flocks.iter().zip(clock) {
@@ -210,7 +213,8 @@ fn travel(world: &World, agents: &mut Agents, dt: f64, first: f64) -> DVec3 {
         let arrays = record.zip(next[range.clone()].par_chunks_mut(CHUNK)).zip(rest[range].par_chunks_mut(CHUNK));
         let moved = arrays.enumerate().map(|(c, ((record, next), rest))| {
             let force = forces.get(c * CHUNK..).unwrap_or(&[]);
-            motion::chunk(world, flock, dt, first, Part { record, next, rest, force })
+            let part = Part { record, next, rest, force };
+            dispatch!(level, simd => motion::chunk(simd, world, flock, dt, first, part))
         });
         if flock.matter.is_some() {
             // in the order of chunks

@@ -1,10 +1,10 @@
-//! What an agent perceives: sums over its neighbours, sixteen at a time.
+//! What agents perceive: sums over their neighbours, for sixteen agents at a time.
 //!
-//! In: an agent and a tile of candidates. Out: [`Sums`]. The laws are those of `laws/flock.wgsl`; the order of additions is fixed.
+//! In: up to sixteen agents of a row of cells, and a run of candidates, which all of them look at one by one. Out: [`Sums`]. The laws are
+//! those of `laws/flock.wgsl`. Each agent adds in the order of the candidates, whoever looks beside it: its bits depend on nothing else.
 
 use super::model::FlockConstants;
-use super::perception::Tile;
-use crate::interact::lanes::{LANES, Lanes, minus, squares, sum};
+use crate::interact::lanes::{LANES, Lanes};
 use crate::laws::flock;
 use crate::scene::FlockModel;
 use crate::state::Record;
@@ -12,79 +12,130 @@ use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
 use glam::Vec3;
 
-/// Sums over neighbours.
+/// Where lanes without an agent are (m): too far for any radius, with squares that are finite.
+const FAR: f32 = 1e18;
+
+/// Up to sixteen agents, component by component.
+#[derive(Clone, Copy, Debug)]
+pub struct Group {
+    /// Positions (m).
+    pub x: [Lanes; 3],
+    /// Velocities (m/s).
+    pub v: [Lanes; 3],
+}
+
+impl Group {
+    /// These agents.
+    #[inline(always)]
+    pub fn new(agents: &[Record]) -> Self {
+        let mut group = Self { x: [[FAR; LANES]; 3], v: [[0.0; LANES]; 3] };
+        for (l, r) in agents.iter().enumerate().take(LANES) {
+            for a in 0..3 {
+                (group.x[a][l], group.v[a][l]) = (r.x[a], r.v[a]);
+            }
+        }
+        group
+    }
+
+    /// The agent of one lane alone.
+    #[inline(always)]
+    pub fn only(&self, lane: usize) -> Self {
+        let mut alone = Self { x: [[FAR; LANES]; 3], v: self.v };
+        for a in 0..3 {
+            alone.x[a][lane] = self.x[a][lane];
+        }
+        alone
+    }
+}
+
+/// Candidates on end.
+#[derive(Clone, Copy, Debug)]
+pub struct Run<'a> {
+    /// The agents.
+    pub agents: &'a [Record],
+    /// What brings their periodic images into place (m).
+    pub shift: [f32; 3],
+}
+
+/// Sums over neighbours, lane by lane.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sums {
     /// Away from those too near: pushes (Reynolds), unit vectors (Couzin).
-    pub repelled: Vec3,
+    pub repelled: [Lanes; 3],
     /// Velocities (m/s) of those aligned with, oneself included.
-    pub velocity: Vec3,
+    pub velocity: [Lanes; 3],
     /// Number of those aligned with, oneself included.
-    pub aligned: f32,
+    pub aligned: Lanes,
     /// Relative places (m) of those drawn to; Couzin: unit vectors.
-    pub place: Vec3,
+    pub place: [Lanes; 3],
     /// Number of those drawn to, oneself included.
-    pub drawn: f32,
+    pub drawn: Lanes,
     /// `d / r^2` (1/m) of those fled.
-    pub fled: Vec3,
+    pub fled: [Lanes; 3],
     /// `d / r^2` (1/m) of those chased.
-    pub chased: Vec3,
+    pub chased: [Lanes; 3],
+}
+
+/// The vector of one lane.
+#[inline(always)]
+pub fn lane(of: &[Lanes; 3], l: usize) -> Vec3 {
+    Vec3::new(of[0][l], of[1][l], of[2][l])
 }
 
 impl Sums {
-    /// Adds what the agent itself brings, where it was not among the candidates.
-    pub fn add_oneself(&mut self, me: &Record) {
-        self.velocity += Vec3::from(me.v);
-        self.aligned += 1.0;
-        self.drawn += 1.0;
-    }
-}
-
-/// The same, lane by lane.
-struct Wide {
-    repelled: [Lanes; 3],
-    velocity: [Lanes; 3],
-    aligned: Lanes,
-    place: [Lanes; 3],
-    drawn: Lanes,
-}
-
-impl Wide {
+    /// Adds what the agents themselves bring, where they were not among the candidates.
     #[inline(always)]
-    fn new() -> Self {
-        let zero = [[0.0; LANES]; 3];
-        Self { repelled: zero, velocity: zero, aligned: [0.0; LANES], place: zero, drawn: [0.0; LANES] }
+    pub fn add_oneself(&mut self, me: &Group) {
+        for l in 0..LANES {
+            for a in 0..3 {
+                self.velocity[a][l] += me.v[a][l];
+            }
+            self.aligned[l] += 1.0;
+            self.drawn[l] += 1.0;
+        }
     }
 }
 
+/// The group as candidates of a run see it: moved by what would bring them into place.
 #[inline(always)]
-fn fold<S: Simd>(simd: S, wide: &[Lanes; 3]) -> Vec3 {
-    Vec3::new(sum(simd, &wide[0]), sum(simd, &wide[1]), sum(simd, &wide[2]))
+fn seen_from(me: &Group, shift: [f32; 3]) -> [Lanes; 3] {
+    let mut x = me.x;
+    for a in 0..3 {
+        for l in 0..LANES {
+            x[a][l] -= shift[a];
+        }
+    }
+    x
 }
 
-/// `d` and its square for sixteen candidates.
+/// `d` from each agent to a candidate, and its square.
 #[inline(always)]
-fn apart<S: Simd>(simd: S, me: &Record, block: &[&Lanes; 6]) -> ([Lanes; 3], Lanes) {
-    let d = [minus(simd, block[0], me.x[0]), minus(simd, block[1], me.x[1]), minus(simd, block[2], me.x[2])];
-    let r_sq = squares(simd, &d);
+fn apart(x: &[Lanes; 3], candidate: &Record) -> ([Lanes; 3], Lanes) {
+    let (mut d, mut r_sq) = ([[0.0; LANES]; 3], [0.0; LANES]);
+    for l in 0..LANES {
+        for a in 0..3 {
+            d[a][l] = candidate.x[a] - x[a][l];
+        }
+        r_sq[l] = d[0][l] * d[0][l] + d[1][l] * d[1][l] + d[2][l] * d[2][l];
+    }
     (d, r_sq)
 }
 
-/// Who of sixteen is in view.
+/// Which agents have the candidate in view.
 #[inline(always)]
-fn in_view(me: &Record, d: &[Lanes; 3], r_sq: &Lanes, bound: f32) -> Lanes {
-    let v = me.v;
-    let speed_sq = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+fn in_view(v: &[Lanes; 3], d: &[Lanes; 3], r_sq: &Lanes, bound: f32) -> Lanes {
     let mut seen = [0.0; LANES];
     for l in 0..LANES {
-        seen[l] = flock::in_view(d[0][l] * v[0] + d[1][l] * v[1] + d[2][l] * v[2], r_sq[l], speed_sq, bound);
+        let speed_sq = v[0][l] * v[0][l] + v[1][l] * v[1][l] + v[2][l] * v[2][l];
+        let along = d[0][l] * v[0][l] + d[1][l] * v[1][l] + d[2][l] * v[2][l];
+        seen[l] = flock::in_view(along, r_sq[l], speed_sq, bound);
     }
     seen
 }
 
 /// Adds `weight` times a vector, lane by lane.
 #[inline(always)]
-fn add(to: &mut [Lanes; 3], weight: &Lanes, vector: [&Lanes; 3]) {
+fn add(to: &mut [Lanes; 3], weight: &Lanes, vector: &[Lanes; 3]) {
     for a in 0..3 {
         for l in 0..LANES {
             to[a][l] += weight[l] * vector[a][l];
@@ -92,30 +143,30 @@ fn add(to: &mut [Lanes; 3], weight: &Lanes, vector: [&Lanes; 3]) {
     }
 }
 
-/// Adds the vectors of those whose weight is 1, not 0: the products are exact, so that fused or not it is the same number.
+/// Adds a vector where the weight is 1, not 0: the products are exact, so that fused or not it is the same number.
 #[inline(always)]
-fn add_those<S: Simd>(simd: S, to: &mut [Lanes; 3], weight: &Lanes, vector: [&Lanes; 3]) {
+fn add_those<S: Simd>(simd: S, to: &mut [Lanes; 3], weight: &Lanes, vector: &[Lanes; 3]) {
     let weight = f32x16::load_array_ref(simd, weight);
     for a in 0..3 {
         let sum = f32x16::load_array_ref(simd, &to[a]);
-        weight.mul_add(f32x16::load_array_ref(simd, vector[a]), sum).store_array(&mut to[a]);
+        weight.mul_add(f32x16::load_array_ref(simd, &vector[a]), sum).store_array(&mut to[a]);
     }
 }
 
-/// Sums over those an agent schools with. `unbounded`: the tile holds topological neighbours, whatever their distance.
+/// The velocity of a candidate in all lanes.
 #[inline(always)]
-pub fn school<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, sums: &mut Sums) {
-    let mut wide = Wide::new();
+fn velocity_of(candidate: &Record) -> [Lanes; 3] {
+    [[candidate.v[0]; LANES], [candidate.v[1]; LANES], [candidate.v[2]; LANES]]
+}
+
+/// Adds those of a run that agents school with. `unbounded`: they are topological neighbours, whatever their distance.
+#[inline(always)]
+pub fn school<S: Simd>(simd: S, me: &Group, rule: &FlockConstants, run: Run, unbounded: bool, sums: &mut Sums) {
     match rule.model {
-        FlockModel::Reynolds => reynolds(simd, me, rule, tile, unbounded, &mut wide),
-        FlockModel::Couzin => couzin(simd, me, rule, tile, unbounded, &mut wide),
-        FlockModel::Vicsek => vicsek(simd, me, rule, tile, unbounded, &mut wide),
+        FlockModel::Reynolds => reynolds(simd, me, rule, run, unbounded, sums),
+        FlockModel::Couzin => couzin(me, rule, run, unbounded, sums),
+        FlockModel::Vicsek => vicsek(simd, me, rule, run, unbounded, sums),
     }
-    sums.repelled += fold(simd, &wide.repelled);
-    sums.velocity += fold(simd, &wide.velocity);
-    sums.aligned += sum(simd, &wide.aligned);
-    sums.place += fold(simd, &wide.place);
-    sums.drawn += sum(simd, &wide.drawn);
 }
 
 /// Square of a radius; of topological neighbours none is too far.
@@ -126,106 +177,102 @@ fn square(radius: f32, unbounded: bool) -> f32 {
 
 /// E22. Compiled for each combination of what most flocks are spared: a second radius, and a field of view.
 #[inline(always)]
-fn reynolds<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+fn reynolds<S: Simd>(simd: S, me: &Group, rule: &FlockConstants, run: Run, unbounded: bool, sums: &mut Sums) {
     let alike = unbounded || rule.alignment_radius == rule.cohesion_radius;
     match (alike, rule.view) {
-        (true, None) => reynolds_of::<S, true, true>(simd, me, rule, tile, unbounded, wide),
-        (true, Some(_)) => reynolds_of::<S, true, false>(simd, me, rule, tile, unbounded, wide),
-        (false, None) => reynolds_of::<S, false, true>(simd, me, rule, tile, unbounded, wide),
-        (false, Some(_)) => reynolds_of::<S, false, false>(simd, me, rule, tile, unbounded, wide),
+        (true, None) => reynolds_of::<S, true, true>(simd, me, rule, run, unbounded, sums),
+        (true, Some(_)) => reynolds_of::<S, true, false>(simd, me, rule, run, unbounded, sums),
+        (false, None) => reynolds_of::<S, false, true>(simd, me, rule, run, unbounded, sums),
+        (false, Some(_)) => reynolds_of::<S, false, false>(simd, me, rule, run, unbounded, sums),
     }
 }
 
-/// `ALIKE`: the radii of alignment and cohesion are the same. `ALL_AROUND`: the agent sees all around.
+/// `ALIKE`: the radii of alignment and cohesion are the same. `ALL_AROUND`: agents see all around.
 #[inline(always)]
 fn reynolds_of<S: Simd, const ALIKE: bool, const ALL_AROUND: bool>(
     simd: S,
-    me: &Record,
+    me: &Group,
     rule: &FlockConstants,
-    tile: &Tile,
+    run: Run,
     unbounded: bool,
-    wide: &mut Wide,
+    sums: &mut Sums,
 ) {
-    let near_sq = rule.separation_radius * rule.separation_radius;
-    let near_limit = f32x16::splat(simd, near_sq);
+    let near_limit = f32x16::splat(simd, rule.separation_radius * rule.separation_radius);
     let align_sq = square(rule.alignment_radius, unbounded);
     let draw_sq = square(rule.cohesion_radius, unbounded);
-    let bound = rule.view.unwrap_or(-1.0);
-    let window = tile.window();
-    for first in window.clone().step_by(u64::BITS as usize) {
-        // where anybody is near, a bit a vector: a branch for each would be foretold badly
+    let x = seen_from(me, run.shift);
+    let (mut velocity, mut place) = (sums.velocity, sums.place);
+    let (mut count_aligned, mut count_drawn) = (sums.aligned, sums.drawn);
+    for part in run.agents.chunks(u64::BITS as usize) {
+        // near somebody, a bit a candidate: a branch for each would be foretold badly
         let mut near = 0u64;
-        for (b, block) in tile.vectors(first..window.end.min(first + u64::BITS as usize)).enumerate() {
-            let (d, r_sq) = apart(simd, me, &block);
+        for (b, candidate) in part.iter().enumerate() {
+            let (d, r_sq) = apart(&x, candidate);
             let (mut aligned, mut drawn) = ([0.0; LANES], [0.0; LANES]);
             for l in 0..LANES {
                 aligned[l] = flock::within(r_sq[l], align_sq);
                 drawn[l] = if ALIKE { aligned[l] } else { flock::within(r_sq[l], draw_sq) };
             }
             if !ALL_AROUND {
-                let seen = in_view(me, &d, &r_sq, bound);
+                let seen = in_view(&me.v, &d, &r_sq, rule.view.unwrap_or(-1.0));
                 for l in 0..LANES {
                     aligned[l] *= seen[l];
                     drawn[l] *= seen[l];
                 }
             }
-            add_those(simd, &mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
-            add_those(simd, &mut wide.place, &drawn, [&d[0], &d[1], &d[2]]);
+            add_those(simd, &mut velocity, &aligned, &velocity_of(candidate));
+            add_those(simd, &mut place, &drawn, &d);
             for l in 0..LANES {
-                wide.aligned[l] += aligned[l];
+                count_aligned[l] += aligned[l];
                 if !ALIKE {
-                    wide.drawn[l] += drawn[l];
+                    count_drawn[l] += drawn[l];
                 }
             }
             near |= u64::from(f32x16::load_array_ref(simd, &r_sq).simd_lt(near_limit).any_true()) << b;
         }
         while near != 0 {
-            let block = tile.block(first + near.trailing_zeros() as usize);
+            separate::<ALL_AROUND>(&me.v, &x, rule, &part[near.trailing_zeros() as usize], &mut sums.repelled);
             near &= near - 1;
-            separate::<S, ALL_AROUND>(simd, me, rule, &block, near_sq, wide);
         }
     }
-    if ALIKE {
-        wide.drawn = wide.aligned;
-    }
+    (sums.velocity, sums.place, sums.aligned) = (velocity, place, count_aligned);
+    sums.drawn = if ALIKE { count_aligned } else { count_drawn };
 }
 
-/// Pushes away from those of sixteen that are near.
+/// Pushes away from a candidate that is near some of the agents.
 #[inline(always)]
-fn separate<S: Simd, const ALL_AROUND: bool>(
-    simd: S,
-    me: &Record,
+fn separate<const ALL_AROUND: bool>(
+    v: &[Lanes; 3],
+    x: &[Lanes; 3],
     rule: &FlockConstants,
-    block: &[&Lanes; 6],
-    near_sq: f32,
-    wide: &mut Wide,
+    candidate: &Record,
+    repelled: &mut [Lanes; 3],
 ) {
-    let (d, r_sq) = apart(simd, me, block);
-    let seen = match ALL_AROUND {
-        true => [1.0; LANES],
-        false => in_view(me, &d, &r_sq, rule.view.unwrap_or(-1.0)),
-    };
-    for l in 0..LANES {
-        let weight = flock::separation(r_sq[l], rule.separation_radius) * flock::within(r_sq[l], near_sq);
-        let push = -seen[l] * weight;
-        wide.repelled[0][l] += push * d[0][l];
-        wide.repelled[1][l] += push * d[1][l];
-        wide.repelled[2][l] += push * d[2][l];
+    let near_sq = rule.separation_radius * rule.separation_radius;
+    let (d, r_sq) = apart(x, candidate);
+    let mut push = [1.0; LANES];
+    if !ALL_AROUND {
+        push = in_view(v, &d, &r_sq, rule.view.unwrap_or(-1.0));
     }
+    for l in 0..LANES {
+        push[l] *= -flock::separation(r_sq[l], rule.separation_radius) * flock::within(r_sq[l], near_sq);
+    }
+    add(repelled, &push, &d);
 }
 
 /// E23. Speeds are equal: velocities stand for directions.
 #[inline(always)]
-fn couzin<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+fn couzin(me: &Group, rule: &FlockConstants, run: Run, unbounded: bool, sums: &mut Sums) {
     let near_sq = rule.separation_radius * rule.separation_radius;
     let align_sq = square(rule.alignment_radius, false).max(near_sq);
     let draw_sq = square(rule.cohesion_radius, unbounded).max(align_sq);
-    for block in tile.vectors(tile.window()) {
-        let (d, r_sq) = apart(simd, me, &block);
-        let seen = match rule.view {
-            Some(bound) => in_view(me, &d, &r_sq, bound),
-            None => [1.0; LANES],
-        };
+    let x = seen_from(me, run.shift);
+    for candidate in run.agents {
+        let (d, r_sq) = apart(&x, candidate);
+        let mut seen = [1.0; LANES];
+        if let Some(bound) = rule.view {
+            seen = in_view(&me.v, &d, &r_sq, bound);
+        }
         let (mut repelled, mut aligned, mut drawn) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for l in 0..LANES {
             let inverse = 1.0 / r_sq[l].max(1e-30).sqrt();
@@ -233,47 +280,44 @@ fn couzin<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unb
             aligned[l] = seen[l] * flock::between(r_sq[l], near_sq, align_sq) / rule.limits.speed;
             drawn[l] = inverse * seen[l] * flock::between(r_sq[l], align_sq, draw_sq);
         }
-        add(&mut wide.repelled, &repelled, [&d[0], &d[1], &d[2]]);
-        add(&mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
-        add(&mut wide.place, &drawn, [&d[0], &d[1], &d[2]]);
+        add(&mut sums.repelled, &repelled, &d);
+        add(&mut sums.velocity, &aligned, &velocity_of(candidate));
+        add(&mut sums.place, &drawn, &d);
     }
 }
 
 /// E24.
 #[inline(always)]
-fn vicsek<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile, unbounded: bool, wide: &mut Wide) {
+fn vicsek<S: Simd>(simd: S, me: &Group, rule: &FlockConstants, run: Run, unbounded: bool, sums: &mut Sums) {
     let align_sq = square(rule.alignment_radius, unbounded);
-    for block in tile.vectors(tile.window()) {
-        let (d, r_sq) = apart(simd, me, &block);
-        let mut aligned = [0.0; LANES];
-        for l in 0..LANES {
-            aligned[l] = flock::within(r_sq[l], align_sq);
-        }
+    let x = seen_from(me, run.shift);
+    for candidate in run.agents {
+        let (d, r_sq) = apart(&x, candidate);
+        let mut aligned = [1.0; LANES];
         if let Some(bound) = rule.view {
-            let seen = in_view(me, &d, &r_sq, bound);
-            for l in 0..LANES {
-                aligned[l] *= seen[l];
-            }
+            aligned = in_view(&me.v, &d, &r_sq, bound);
         }
-        add(&mut wide.velocity, &aligned, [block[3], block[4], block[5]]);
+        for l in 0..LANES {
+            aligned[l] *= flock::within(r_sq[l], align_sq);
+        }
+        add_those(simd, &mut sums.velocity, &aligned, &velocity_of(candidate));
     }
 }
 
-/// E26: sum of `d / r^2` over those in sight.
+/// E26: adds `d / r^2` of those of a run that are in sight.
 #[inline(always)]
-pub fn seen<S: Simd>(simd: S, me: &Record, rule: &FlockConstants, tile: &Tile) -> Vec3 {
-    let mut total = [[0.0; LANES]; 3];
+pub fn sight(me: &Group, rule: &FlockConstants, run: Run, total: &mut [Lanes; 3]) {
     let sight_sq = rule.sight * rule.sight;
-    for block in tile.vectors(tile.window()) {
-        let (d, r_sq) = apart(simd, me, &block);
-        let mut weight = match rule.view {
-            Some(bound) => in_view(me, &d, &r_sq, bound),
-            None => [1.0; LANES],
-        };
+    let x = seen_from(me, run.shift);
+    for candidate in run.agents {
+        let (d, r_sq) = apart(&x, candidate);
+        let mut weight = [1.0; LANES];
+        if let Some(bound) = rule.view {
+            weight = in_view(&me.v, &d, &r_sq, bound);
+        }
         for l in 0..LANES {
             weight[l] *= flock::within(r_sq[l], sight_sq) * flock::nearness(r_sq[l]);
         }
-        add(&mut total, &weight, [&d[0], &d[1], &d[2]]);
+        add(total, &weight, &d);
     }
-    fold(simd, &total)
 }

@@ -68,23 +68,25 @@ fn limited(a: vec3<f32>, largest: f32) -> vec3<f32> {
 }
 
 // Direction `to` (unit), but turned away from `from` (unit) by no more than the angle with this cosine and sine.
+// Without branches, for many agents at once: a weight of 0 or 1 chooses.
 fn turned(unit_from: vec3<f32>, unit_to: vec3<f32>, cosine: f32, sine: f32) -> vec3<f32> {
   let along = dot(unit_from, unit_to);
   let across = unit_to - unit_from * along;
   let size = length(across);
-  if (along >= cosine) { return unit_to; }
-  if (size < 1e-6) { return unit_from; }   // straight behind: no side to turn to
-  return unit_from * cosine + across * (sine / size);
+  let behind = size < 1e-6;   // straight behind: no side to turn to
+  let bent = unit_from * select(cosine, 1.0, behind) + across * select(sine / max(size, 1e-6), 0.0, behind);
+  let free = select(0.0, 1.0, along >= cosine);
+  return unit_to * free + bent * (1.0 - free);
 }
 
-// E22: velocity after a step, with turn and speed limits. `heading` is v's direction, 0 for an agent at rest.
-fn moved(v: vec3<f32>, a: vec3<f32>, dt: f32, heading: vec3<f32>, cosine: f32, sine: f32, slowest: f32, fastest: f32) -> vec3<f32> {
+// E22: velocity after a step, with turn and speed limits. An agent at rest may turn anywhere; one that stops keeps its direction.
+fn moved(v: vec3<f32>, a: vec3<f32>, dt: f32, cosine: f32, sine: f32, slowest: f32, fastest: f32) -> vec3<f32> {
   let wanted = v + a * dt;
   let speed = length(wanted);
-  if (speed < 1e-12) { return heading * slowest; }
-  let to = wanted / speed;
-  if (dot(heading, heading) < 0.5) { return to * clamp(speed, slowest, fastest); }
-  return turned(heading, to, cosine, sine) * clamp(speed, slowest, fastest);
+  let heading = unit(v);
+  let stops = select(0.0, 1.0, speed < 1e-12);
+  let to = wanted / max(speed, 1e-12) * (1.0 - stops) + heading * stops;
+  return turned(heading, to, select(cosine, -2.0, dot(heading, heading) < 0.5), sine) * clamp(speed, slowest, fastest);
 }
 
 // E23 (Couzin et al. 2002): direction wanted, from the sums over the zones of repulsion, orientation and attraction.
