@@ -281,9 +281,11 @@ fn couzin(orientation: f64, attraction: f64, seed: u64, steps: u32) -> (f64, f64
 
 #[test]
 fn couzin_swarms_mill_and_fly_parallel() {
-    // one run of each regime; the tolerances are those of D2
+    // means of four runs, as one of a torus wavers by 0.026; the tolerances are those of D2
     for (orientation, p, m) in [(1.0, Some(0.095), Some(0.882)), (6.0, Some(0.999), None)] {
-        let (got_p, got_m, _) = couzin(orientation, 14.0, 1, 4000);
+        let runs: Vec<_> = (1..=4).map(|seed| couzin(orientation, 14.0, seed, 4000)).collect();
+        let mean = |of: fn(&(f64, f64, usize)) -> f64| runs.iter().map(of).sum::<f64>() / 4.0;
+        let (got_p, got_m) = (mean(|r| r.0), mean(|r| r.1));
         println!("orientation {orientation}: p {got_p:.3} m {got_m:.3}");
         assert!(p.is_none_or(|p: f64| (got_p - p).abs() < 0.03), "{orientation}: p = {got_p}");
         assert!(m.is_none_or(|m: f64| (got_m - m).abs() < 0.05), "{orientation}: m = {got_m}");

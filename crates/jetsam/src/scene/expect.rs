@@ -143,6 +143,8 @@ pub enum By {
     Spread,
     /// Mean.
     Mean,
+    /// Median: of runs that end in one of two states, what the more frequent is like.
+    Median,
     /// Order of convergence: logarithm of the ratio of the first error to the second, to the base of the refinement. Of
     /// three variants without an exact value: from their differences (Richardson).
     Order,

@@ -140,7 +140,7 @@ impl<'a> Judge<'a> {
             }
             let enough = match c.by {
                 By::Order if c.exact.is_none() => c.of.len() == 3,
-                By::Spread | By::Mean => c.of.len() >= 2,
+                By::Spread | By::Mean | By::Median => c.of.len() >= 2,
                 _ => c.of.len() == 2,
             };
             if !enough {
@@ -215,9 +215,14 @@ impl<'a> Judge<'a> {
         match by {
             By::Difference => n[0] - n[1],
             By::Ratio => n[0] / n[1],
-            By::Spread if n.iter().any(|x| x.is_nan()) => f64::NAN,
+            By::Spread | By::Median if n.iter().any(|x| x.is_nan()) => f64::NAN,
             By::Spread => max - min,
             By::Mean => n.iter().sum::<f64>() / n.len() as f64,
+            By::Median => {
+                let mut n = n.to_vec();
+                n.sort_by(f64::total_cmp);
+                0.5 * (n[(n.len() - 1) / 2] + n[n.len() / 2])
+            }
             By::Order => {
                 let ratio = if self.exact.is_none() { (n[0] - n[1]) / (n[1] - n[2]) } else { n[0] / n[1] };
                 ratio.abs().ln() / self.expect.refinement.ln()
