@@ -20,7 +20,7 @@ use libtest_mimic::{Arguments, Trial, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let tests: [(&str, fn()); 33] = [
+    let tests: [(&str, fn()); 34] = [
         ("stages_agree_in_a_tank_with_bodies", stages_agree_in_a_tank_with_bodies),
         ("stages_agree_with_every_law", stages_agree_with_every_law),
         ("stages_agree_in_two_dimensions", stages_agree_in_two_dimensions),
@@ -30,6 +30,7 @@ fn main() -> ExitCode {
         ("queued_steps_are_steps", queued_steps_are_steps),
         ("sources_and_sinks_agree", sources_and_sinks_agree),
         ("scripts_are_followed", scripts_are_followed),
+        ("slow_turns_are_not_rounded_away", slow_turns_are_not_rounded_away),
         ("a_hand_is_felt_alike", a_hand_is_felt_alike),
         ("a_lost_device_is_said", a_lost_device_is_said),
         ("steps_add_up_to_a_frame", steps_add_up_to_a_frame),
@@ -490,6 +491,21 @@ fn scripts_are_followed() {
     assert!((a.momentum - b.momentum).length() < 2e-4 * a.momentum_scale, "{} {}", a.momentum, b.momentum);
     let paddle = |w: &World| w.state().bodies.body.iter().find(|b| b.name == "paddle").unwrap().q;
     assert!(paddle(&cpu).angle_between(paddle(&gpu)) < 1e-5);
+}
+
+/// A cube turns by omega t, though each step turns it by less than the last digit of its orientation.
+fn slow_turns_are_not_rounded_away() {
+    let text = "[world]\ngravity = [0, 0, 0]\n[domain]\nmin = [-1, -1, -1]\nmax = [1, 1, 1]\nwalls = [\"open\", \"open\", \"open\"]\n\
+                [resolution]\nspacing = 0.1\n[solver]\ndt = 1e-3\n[[rigid]]\nname = \"cube\"\ndensity = 1000\nspin = [1e-5, 2e-5, 0]\n\
+                shape = { box = { min = [-0.2, -0.2, -0.2], max = [0.2, 0.2, 0.2] } }\n\
+                copies = { count = 1, random = { min = [-0.5, -0.5, -0.5], max = [0.5, 0.5, 0.5] }, tumble = true }\n";
+    let mut w = on_gpu(text);
+    let q = |w: &World| w.state().bodies.body[0].q;
+    let begin = q(&w);
+    assert_eq!(w.run_to(0.2), None, "{:?}", w.fault());
+    let turned = (q(&w) * begin.conjugate()).xyz() * 2.0;
+    let expected = 0.2 * glam::DVec3::new(1e-5, 2e-5, 0.0);
+    assert!((turned - expected).length() < 1e-3 * expected.length(), "{turned}, not {expected}");
 }
 
 /// A device that is taken out ends a run with an error that names a remedy, not the program.

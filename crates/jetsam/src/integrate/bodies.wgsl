@@ -1,9 +1,13 @@
 // Rigid bodies, the twin of bodies.rs: drift and kick (E20), forces and torques summed (E18).
 
+// A vector turned by q and made |q|^2 times as long: what is missing of |q| = 1 must not bend it.
+fn turned_evenly(q: vec4<f32>, v: vec3<f32>) -> vec3<f32> {
+  return v * (q.w * q.w - dot(q.xyz, q.xyz)) + 2.0 * (q.w * cross(q.xyz, v) + q.xyz * dot(q.xyz, v));
+}
 // I^-1 L in world axes for the orientation q.
 fn spin(b: Body, q: vec4<f32>, l: vec3<f32>) -> vec3<f32> {
-  let own = turn(vec4<f32>(-q.xyz, q.w), l);
-  return turn(q, b.inertia_x.xyz * own.x + b.inertia_y.xyz * own.y + b.inertia_z.xyz * own.z);
+  let own = turned_evenly(vec4<f32>(-q.xyz, q.w), l);
+  return turned_evenly(q, b.inertia_x.xyz * own.x + b.inertia_y.xyz * own.y + b.inertia_z.xyz * own.z);
 }
 
 // Whether bodies make a part of a step now.
@@ -36,12 +40,12 @@ fn half_kick_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups
 }
 
 // Orientation after a free turn with constant angular momentum: implicit midpoint rule.
-fn turned_body(b: Body, l_half: vec3<f32>, dt: f32) -> vec4<f32> {
-  var middle = b.q;
+fn turned_body(b: Body, l_half: vec3<f32>, dt: f32) -> Orientation {
+  var w = spin(b, b.q, l_half);
   for (var round = 0; round < 6; round += 1) {
-    middle = times(turned_by(0.5 * dt * spin(b, middle, l_half)), b.q);
+    w = spin(b, b.q + (times(turned_more(0.5 * dt * w), b.q) - b.q_rest), l_half);
   }
-  return normalize(times(turned_by(dt * spin(b, middle, l_half)), b.q));
+  return turned_on(b.q, b.q_rest, dt * w);
 }
 
 @compute @workgroup_size(64)
@@ -53,11 +57,12 @@ fn drift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   let dt = clock.part;
   let rest = dt - first_kick();
   let moved_x = kept(b.x.xyz, b.rest.xyz, dt * b.p_half.xyz / b.rest.w);
-  let q = turned_body(b, b.l_half.xyz, dt);
+  let turned = turned_body(b, b.l_half.xyz, dt);
   let now = b.l_half.xyz + rest * b.torque.xyz;
   bodies[k].x = vec4<f32>(home_all(moved_x.sum), b.x.w);
   bodies[k].rest = vec4<f32>(moved_x.rest, b.rest.w);
-  bodies[k].q = q;
+  bodies[k].q = turned.q;
+  bodies[k].q_rest = turned.rest;
   bodies[k].p_rest = b.p_rest;
   bodies[k].l_rest = b.l_rest;
   bodies[k].p_half = b.p_half;
@@ -66,7 +71,7 @@ fn drift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   bodies[k].p = vec4<f32>(p, 0.0);
   bodies[k].v = vec4<f32>(p / b.rest.w, 0.0);
   bodies[k].l = vec4<f32>(now, 0.0);
-  bodies[k].omega = vec4<f32>(spin(b, q, now), 0.0);
+  bodies[k].omega = vec4<f32>(spin(b, turned.q, now), 0.0);
   if (IMPLICIT) { swept[k].impulse += first_kick() * swept[k].outside; }
 }
 

@@ -36,7 +36,7 @@ fn end_later(k: u32, anchor: vec3<f32>) -> End {
   var e = end_now(k, anchor);
   if (e.moves) {
     let b = bodies[k];
-    e.q = turned_body(b, b.l_half.xyz, clock.part);
+    e.q = turned_body(b, b.l_half.xyz, clock.part).q;
     e.v = b.p_half.xyz / b.rest.w;
   } else { e.v = vec3<f32>(0.0); }
   return e;

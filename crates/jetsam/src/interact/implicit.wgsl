@@ -347,7 +347,9 @@ fn shift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   bodies[k].omega = vec4<f32>(spin(b, b.q, b.l.xyz + dt * by.twist.xyz), 0.0);
   bodies[k].x = vec4<f32>(home_all(x.sum), b.x.w);
   bodies[k].rest = vec4<f32>(x.rest, b.rest.w);
-  bodies[k].q = normalize(times(turned_by(dt * dt * by.spin.xyz), b.q));
+  let turned = turned_on(b.q, b.q_rest, dt * dt * by.spin.xyz);
+  bodies[k].q = turned.q;
+  bodies[k].q_rest = turned.rest;
 }
 // Slots follow their bodies where those are in the midst of a solve.
 @compute @workgroup_size(128)

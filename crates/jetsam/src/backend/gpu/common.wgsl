@@ -67,6 +67,7 @@ struct Body {
   l_half: vec4<f32>,
   p_rest: vec4<f32>,      // what rounding left over of both
   l_rest: vec4<f32>,
+  q_rest: vec4<f32>,      // and of q
   inertia_x: vec4<f32>,   // columns of the inverse inertia in the body's axes
   inertia_y: vec4<f32>,
   inertia_z: vec4<f32>,
@@ -380,8 +381,17 @@ fn turn(q: vec4<f32>, v: vec3<f32>) -> vec3<f32> {
 fn times(a: vec4<f32>, b: vec4<f32>) -> vec4<f32> {
   return vec4<f32>(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
 }
-fn turned_by(angle: vec3<f32>) -> vec4<f32> {
+// The rotation by an angle less the one that does nothing, exact where it is small.
+fn turned_more(angle: vec3<f32>) -> vec4<f32> {
   let size = length(angle);
-  if (size < 1e-6) { return normalize(vec4<f32>(0.5 * angle, 1.0)); }
-  return vec4<f32>(angle * (sin(0.5 * size) / size), cos(0.5 * size));
+  let quarter = sin(0.25 * size);
+  return vec4<f32>(angle * select(sin(0.5 * size) / size, 0.5, size < 1e-6), -2.0 * quarter * quarter);
+}
+// An orientation turned further, with what rounding left over of it, and brought back to length 1: small turns about one axis are lost
+// otherwise, while it turns fast about another.
+struct Orientation { q: vec4<f32>, rest: vec4<f32> }
+fn turned_on(q: vec4<f32>, rest: vec4<f32>, angle: vec3<f32>) -> Orientation {
+  let y = times(turned_more(angle), q) - 0.5 * (dot(q, q) - 1.0) * q - rest;
+  let t = (q + y) * m.contact.z;
+  return Orientation(t, (t - q) - y);
 }

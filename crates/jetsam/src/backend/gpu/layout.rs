@@ -70,6 +70,7 @@ pub struct GpuBody {
     pub l_half: V,
     pub p_rest: V,
     pub l_rest: V,
+    pub q_rest: V,
     pub inertia: [V; 3],
     pub force: V,
     pub torque: V,
@@ -414,6 +415,7 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
             l_half: single(b.l_half, 0.0),
             p_rest: single(left_over(p), 0.0),
             l_rest: single(left_over(b.l), 0.0),
+            q_rest: (b.q.as_quat().as_dquat() - b.q).as_quat().to_array(),
             inertia: [single(inertia.x_axis, radius as f32), single(inertia.y_axis, 0.0), single(inertia.z_axis, 0.0)],
             force: single(b.force, b.sharers),
             torque: single(b.torque, 0.0),
@@ -434,7 +436,7 @@ pub fn to_body(from: &GpuBody, body: &mut Body) {
     let p = &from.pose;
     if !body.is_static() {
         body.x = double(p.x) - double(p.rest);
-        body.q = DQuat::from_array(p.q.map(f64::from));
+        body.q = DQuat::from_array(p.q.map(f64::from)) - DQuat::from_array(from.q_rest.map(f64::from));
         (body.v, body.omega) = ((double(from.p) - double(from.p_rest)) / body.mass, double(p.omega));
         (body.l, body.l_half) = (double(from.l) - double(from.l_rest), double(from.l_half));
         body.v_half = double(from.p_half) / body.mass;
@@ -722,6 +724,7 @@ mod tests {
             l_half,
             p_rest,
             l_rest,
+            q_rest,
             force,
             torque,
             force_fluid,
