@@ -117,7 +117,7 @@ pub struct Shake {
 impl Shake {
     /// What is added to gravity at a time (m/s^2).
     pub fn felt(&self, time: f64) -> DVec3 {
-        if time < self.start || self.stop.is_some_and(|s| time > s) {
+        if time < self.start || self.stop.is_some_and(|s| time >= s) {
             return DVec3::ZERO;
         }
         let rate = TAU / self.period;

@@ -48,7 +48,8 @@ fn course_panel(base: &Scene, probe: usize, variants: &[Variant], runs: &[Run]) 
                 continue;
             }
             judged = true;
-            panel.sets.extend(reference(&judge, ends, color));
+            // what runs are compared with has their colour, or one of its own beside a single run
+            panel.sets.extend(reference(&judge, ends, if variants.len() == 1 { 1 } else { color }));
         }
     }
     panel.sets.dedup_by(|a, b| a.mark != Mark::Line && a.mark == b.mark && a.points == b.points);
@@ -57,7 +58,7 @@ fn course_panel(base: &Scene, probe: usize, variants: &[Variant], runs: &[Run]) 
 
 /// What is expected of a course: a curve, a point, a level, or nothing that can be drawn.
 fn reference(judge: &Judge, ends: [f64; 2], color: usize) -> Option<Set> {
-    let set = |mark, points| Some(Set { name: String::new(), mark, color: color + 1, points });
+    let set = |mark, points| Some(Set { name: String::new(), mark, color, points });
     if !judge.curve.is_empty() {
         return set(Mark::Rings, judge.curve.clone());
     }

@@ -76,7 +76,8 @@ impl Axis {
         if min > max {
             (min, max) = (0.0, 1.0);
         }
-        let size = (max - min).max(1e-6 * max.abs().max(min.abs())).max(1e-300);
+        let size = (max - min).max(1e-6 * max.abs().max(min.abs()));
+        let size = if size == 0.0 { 1.0 } else { size }; // nothing but zeros
         Self { min: min - 0.04 * size, max: max + 0.04 * size, from, to }
     }
 
