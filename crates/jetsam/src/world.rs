@@ -292,10 +292,10 @@ impl World {
         if end == 0.0 || self.model.fluids.is_empty() {
             return;
         }
-        // a tenth of the frequency of the slowest sound wave that stands in the domain: waves die in a few periods, and
+        // of the slowest sound wave that stands in the domain a quarter of what is critical: waves die in two periods, and
         // particles may still find their places
         let height = (self.model.grid.max - self.model.grid.min).abs().max_element();
-        let drag = 0.1 * std::f64::consts::PI * self.model.sound_speed / height;
+        let drag = 0.5 * std::f64::consts::PI * self.model.sound_speed / height;
         let mut time = 0.0;
         while time < end {
             let (dt, _) = self.next_dt(end - time);
