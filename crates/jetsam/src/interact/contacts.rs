@@ -162,6 +162,8 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
 pub struct Friction {
     slips: Slips,
     load: [f32; HELD_CONTACTS],
+    /// Contacts for whose slip there was no place.
+    pub forgotten: u32,
 }
 
 /// Who touches whom: slots and bodies of this particle and of the other.
@@ -216,6 +218,7 @@ impl Friction {
                 weakest = k;
             }
         }
+        self.forgotten += 1;
         if load > self.load[weakest] {
             (self.slips.with[weakest], self.slips.slip[weakest], self.load[weakest]) = (with, slip, load);
         }
