@@ -230,3 +230,22 @@ impl Friction {
         (!self.slips.is_empty()).then_some(self.slips)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of more contacts than a particle remembers those that bear most stay, and the others are counted.
+    #[test]
+    fn forgotten_slips_are_counted() {
+        let mut friction = Friction::default();
+        let loads = [3.0, 1.0, 5.0, 2.0, 9.0, 7.0, 4.0, 6.0, 8.0, 0.5];
+        for (with, load) in (0..).zip(loads) {
+            friction.keep(with, [load, 0.0, 0.0], load);
+        }
+        let slips = friction.slips().expect("eight slips");
+        assert_eq!(friction.forgotten as usize, loads.len() - HELD_CONTACTS);
+        // the ninth took the place of the one that bore least, the tenth bears less than any
+        assert_eq!((slips.of(8), slips.of(1), slips.of(9)), (Some([8.0, 0.0, 0.0]), None, None));
+    }
+}

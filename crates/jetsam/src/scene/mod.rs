@@ -254,7 +254,8 @@ pub struct Solver {
     /// How long a body lies still on others before it sleeps, and costs nothing until something touches it. 0: never.
     #[serde(default = "d::sleep")]
     pub sleep: f64,
-    /// Before time begins, let the fluid come to rest under strong drag for this long (bodies stand still).
+    /// Before time begins, let the fluid come to rest under strong drag for this long (bodies stand still). Sound dies
+    /// at the end, in two periods of the slowest wave: eight times as long as it takes through the domain.
     #[serde(default = "d::settle")]
     pub settle: f64,
 }
