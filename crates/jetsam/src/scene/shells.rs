@@ -115,10 +115,14 @@ mod tests {
         let ring = body("torus = { center = [0, 0, 0], axis = [1, 2, 2], radius = 1.0, tube = 0.4 }");
         let across = |p: DVec3| (p - axis * p.dot(axis)).length();
         // signed distance from the surface, and the volume
-        let cases: [(Shape, Box<dyn Fn(DVec3) -> f64>, f64); 3] = [
-            (ball, Box::new(|p| p.distance(DVec3::new(1.0, 2.0, 3.0)) - 0.8), 4.0 / 3.0 * PI * 0.512),
-            (rod, Box::new(move |p| (across(p) - 0.8).max(p.dot(axis).abs() - 0.3)), PI * 0.64 * 0.6),
-            (ring, Box::new(move |p| (across(p) - 1.0).hypot(p.dot(axis)) - 0.4), 2.0 * PI * PI * 0.16),
+        let of_ball = |p: DVec3| p.distance(DVec3::new(1.0, 2.0, 3.0)) - 0.8;
+        let of_rod = |p: DVec3| (across(p) - 0.8).max(p.dot(axis).abs() - 0.3);
+        let of_ring = |p: DVec3| (across(p) - 1.0).hypot(p.dot(axis)) - 0.4;
+        type Distance<'a> = &'a dyn Fn(DVec3) -> f64;
+        let cases: [(Shape, Distance, f64); 3] = [
+            (ball, &of_ball, 4.0 / 3.0 * PI * 0.512),
+            (rod, &of_rod, PI * 0.64 * 0.6),
+            (ring, &of_ring, 2.0 * PI * PI * 0.16),
         ];
         for (shape, distance, volume) in cases {
             let points = shells(&shape, dx, false).expect("a round shape");
