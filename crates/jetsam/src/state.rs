@@ -58,6 +58,8 @@ pub struct Touch {
     pub sharers: f32,
     /// Of these, how many are so deep that they would pass through.
     pub deep: u32,
+    /// Of these, how many rub but have no place among the slips it remembers ([`HELD_CONTACTS`]).
+    pub forgotten: u32,
 }
 
 /// Contacts whose slip one particle remembers: those that bear most.

@@ -292,13 +292,15 @@ impl World {
         if end == 0.0 || self.model.fluids.is_empty() {
             return;
         }
-        // a tenth of the frequency of the slowest sound wave that stands in the domain: waves die in a few periods, and
-        // particles may still find their places
+        // in parts of what is critical for the slowest sound wave between a floor and a surface, omega = pi c / (2 height): a tenth, so
+        // that particles find their places; through the last two periods, or the second half, a half: by then sound is dead
         let height = (self.model.grid.max - self.model.grid.min).abs().max_element();
-        let drag = 0.1 * std::f64::consts::PI * self.model.sound_speed / height;
+        let critical = std::f64::consts::PI * self.model.sound_speed / height;
+        let last = f64::min(8.0 * std::f64::consts::PI / critical, 0.5 * end);
         let mut time = 0.0;
         while time < end {
             let (dt, _) = self.next_dt(end - time);
+            let drag = critical * if end - time > last { 0.1 } else { 0.5 };
             let advance = Advance { time: 0.0, dt, dt_before: self.dt_before, drag, parts: 1 };
             for &stage in self.order() {
                 self.backend.run(stage, &self.model, advance);

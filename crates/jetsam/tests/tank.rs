@@ -129,3 +129,28 @@ fn an_integrated_density_does_not_forget_how_close_particles_are() {
     let p = &world.state().particles;
     assert!(p.segment(Kind::Fluid).all(|i| p.density[i] > 0.96 && p.density[i] < 0.99));
 }
+
+#[test]
+fn settling_ends_sound() {
+    // water without pressure falls into its own weight: the load on the floor swings by all of it, with the period 4 H / c of the
+    // slowest wave. The drag is a tenth, then half of what is critical for a domain as high as the water, here 0.071 and 0.36
+    // of it, so that after two periods of each exp(-0.43 * 4 pi) = 0.005 is left
+    let (depth, sound) = (0.5, 20.0);
+    let period = 4.0 * depth / sound;
+    let text = format!(
+        "[world]\ndimensions = 2\n[domain]\nmin = [0, 0, 0]\nmax = [0.2, 0, {}]\n[resolution]\nspacing = 0.025\n[solver]\n\
+         sound_speed = {sound}\ndensity = \"continuity\"\nartificial_viscosity = 0\nsettle = {}\n\
+         [[fluid]]\nshape = {{ box = {{ min = [0, 0, 0], max = [0.2, 0, {depth}] }} }}\nstart = \"lattice\"\n",
+        1.4 * depth,
+        4.0 * period
+    );
+    let mut world = World::from_scene(&scene(&text)).unwrap();
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    while world.time() < 1.2 * period {
+        world.step(0.01 * period);
+        let load = -world.state().bodies.body[0].force.z / (RHO * G * depth * 0.2);
+        (low, high) = (low.min(load), high.max(load));
+    }
+    println!("load on the floor {low:.3} to {high:.3} of the weight");
+    assert!(high - low < 0.06 && (0.5 * (high + low) - 1.0).abs() < 0.02, "{low} to {high}");
+}

@@ -19,9 +19,9 @@ impl Scene {
         let dx = self.resolution.spacing;
         for (index, rigid) in self.rigid.iter().enumerate() {
             let key = format!("rigid.{index}");
-            let solid = self.solid(&rigid.shape, &format!("{key}.shape"))?;
+            let solid = self.body_solid(&rigid.shape, rigid.fill, &key)?;
             warnings.extend(solid.warnings.iter().cloned());
-            let normals = normals(&solid.points, dx, self.world.dimensions);
+            let normals = normals(&solid, dx, self.world.dimensions);
             let mass = match (rigid.density, rigid.mass) {
                 (Some(d), None) => d * solid.volume,
                 (None, Some(m)) => m,
@@ -177,13 +177,13 @@ impl Scene {
         }
         for (index, fixed) in self.statics.iter().enumerate() {
             let key = format!("static.{index}");
-            let solid = self.solid(&fixed.shape, &format!("{key}.shape"))?;
+            let solid = self.body_solid(&fixed.shape, fixed.fill, &key)?;
             warnings.extend(solid.warnings.iter().cloned());
             let name = fixed.name.clone().unwrap_or_else(|| "static".into());
             let turn = axis_angle(fixed.rotation);
             let mut body = NewBody::new(name, &solid, DVec3::from(fixed.position), turn, self.world.dimensions);
-            let skin = skin(&solid.points, self.resolution.spacing, layers as i64, self.world.dimensions);
-            let normals = normals(&solid.points, self.resolution.spacing, self.world.dimensions);
+            let skin = skin(&solid, self.resolution.spacing, layers as i64, self.world.dimensions);
+            let normals = normals(&solid, self.resolution.spacing, self.world.dimensions);
             self.check_motion(&fixed.motion, &format!("{key}.motion"))?;
             let moves = fixed.motion != Motion::None;
             let inside =
@@ -348,8 +348,12 @@ impl NewBody {
     }
 }
 
-/// Indices of the points of a lattice that have an empty place within `depth` steps: what a fluid outside can see.
-fn skin(points: &[DVec3], dx: f64, depth: i64, dimensions: u32) -> Vec<usize> {
+/// Indices of the points of a lattice that have an empty place within `depth` steps: what a fluid outside can see. Of shells, all.
+fn skin(solid: &Solid, dx: f64, depth: i64, dimensions: u32) -> Vec<usize> {
+    let points = &solid.points;
+    if solid.shells {
+        return (0..points.len()).collect();
+    }
     let Some(&origin) = points.first() else { return vec![] };
     let key = |p: DVec3| ((p - origin) / dx).round().as_i64vec3().to_array();
     let full: std::collections::HashSet<[i64; 3]> = points.iter().map(|&p| key(p)).collect();

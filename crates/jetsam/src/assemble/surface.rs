@@ -1,6 +1,7 @@
 //! Surface normals of the particles of a body (E12): which of them lie inside a flat face, and where it looks.
 
 use super::near::Near;
+use crate::scene::solid::Solid;
 use glam::DVec3;
 
 /// Neighbours count within this many spacings: faces and edges of a cell, not its corners.
@@ -11,8 +12,12 @@ const IN_PLANE: f64 = 0.3;
 const GAP: f64 = 1.8;
 
 /// For each point of a lattice the outward normal: length 1 inside a flat face, 2 inside a sheet (one layer, two sides),
-/// 0 at edges, on curved surfaces and inside the body.
-pub(super) fn normals(points: &[DVec3], dx: f64, dimensions: u32) -> Vec<[f32; 3]> {
+/// 0 at edges, on curved surfaces, which shells are, and inside the body.
+pub(super) fn normals(solid: &Solid, dx: f64, dimensions: u32) -> Vec<[f32; 3]> {
+    let points = &solid.points;
+    if solid.shells {
+        return vec![[0.0; 3]; points.len()];
+    }
     let near = Near::of(REACH * dx, points.iter().copied());
     let one = |&p: &DVec3| {
         let mut around: Vec<DVec3> = Vec::new();

@@ -599,6 +599,10 @@ impl Cpu {
             body.deep |= far && !body.is_static();
             self.ledger.fast_contacts += u64::from(body.deep && !before && !body.is_static());
         }
+        if !b.slips.is_empty() {
+            let rigid = &p.touch[..p.count[Kind::Rigid as usize]];
+            self.ledger.forgotten_slips += rigid.par_iter().map(|t| u64::from(t.forgotten)).sum::<u64>();
+        }
         let found = &self.slips[0];
         b.slips.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(slot, slips)| {
             if b.body[b.owner[slot] as usize].asleep {
@@ -670,6 +674,7 @@ impl Cpu {
             lost: self.ledger.lost,
             nonfinite: self.ledger.nonfinite,
             fast_contacts: self.ledger.fast_contacts,
+            forgotten_slips: self.ledger.forgotten_slips,
             put_back: self.ledger.put_back,
             external_force: self.held + b.joint_force,
             external_impulse: if model.implicit() { self.implicit.impulse } else { b.joint_impulse }

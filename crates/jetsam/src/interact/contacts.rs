@@ -162,6 +162,8 @@ pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &
 pub struct Friction {
     slips: Slips,
     load: [f32; HELD_CONTACTS],
+    /// Contacts for whose slip there was no place.
+    pub forgotten: u32,
 }
 
 /// Who touches whom: slots and bodies of this particle and of the other.
@@ -216,6 +218,7 @@ impl Friction {
                 weakest = k;
             }
         }
+        self.forgotten += 1;
         if load > self.load[weakest] {
             (self.slips.with[weakest], self.slips.slip[weakest], self.load[weakest]) = (with, slip, load);
         }
@@ -225,5 +228,24 @@ impl Friction {
     #[inline(always)]
     pub fn slips(&self) -> Option<Slips> {
         (!self.slips.is_empty()).then_some(self.slips)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of more contacts than a particle remembers those that bear most stay, and the others are counted.
+    #[test]
+    fn forgotten_slips_are_counted() {
+        let mut friction = Friction::default();
+        let loads = [3.0, 1.0, 5.0, 2.0, 9.0, 7.0, 4.0, 6.0, 8.0, 0.5];
+        for (with, load) in (0..).zip(loads) {
+            friction.keep(with, [load, 0.0, 0.0], load);
+        }
+        let slips = friction.slips().expect("eight slips");
+        assert_eq!(friction.forgotten as usize, loads.len() - HELD_CONTACTS);
+        // the ninth took the place of the one that bore least, the tenth bears less than any
+        assert_eq!((slips.of(8), slips.of(1), slips.of(9)), (Some([8.0, 0.0, 0.0]), None, None));
     }
 }

@@ -193,6 +193,7 @@ fn on_body<S: Simd, const PLAIN: bool>(
         contacts::add(input, i, listed.indices(runs.exact(other)), &mut touch, &mut friction);
     }
     force += Vec3::from(touch.contact);
+    touch.forgotten = friction.forgotten;
     if model.moves(owner) {
         if let Some(held) = friction.slips() {
             slips.push(held);

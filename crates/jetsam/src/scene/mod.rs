@@ -12,6 +12,7 @@ mod load;
 pub mod motion;
 mod probe;
 mod save;
+mod shells;
 pub mod solid;
 
 pub use crate::formula::Formula;
@@ -253,7 +254,8 @@ pub struct Solver {
     /// How long a body lies still on others before it sleeps, and costs nothing until something touches it. 0: never.
     #[serde(default = "d::sleep")]
     pub sleep: f64,
-    /// Before time begins, let the fluid come to rest under strong drag for this long (bodies stand still).
+    /// Before time begins, let the fluid come to rest under strong drag for this long (bodies stand still). Sound dies
+    /// at the end, in two periods of the slowest wave: eight times as long as it takes through the domain.
     #[serde(default = "d::settle")]
     pub settle: f64,
 }
@@ -476,6 +478,9 @@ pub struct Rigid {
     pub name: Option<String>,
     /// Its shape in its own frame.
     pub shape: Shape,
+    /// How its particles stand.
+    #[serde(default)]
+    pub fill: Fill,
     /// Density; either this or `mass`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
@@ -516,6 +521,18 @@ pub struct Rigid {
 
 fn no_rotation() -> [f64; 4] {
     [0.0, 0.0, 1.0, 0.0]
+}
+
+/// How the particles of a body stand. Mass, centre and inertia are the exact shape's either way (E19).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Fill {
+    /// On a lattice: flat faces are even, round surfaces are stairs and facets.
+    #[default]
+    Lattice,
+    /// In shells that follow a round surface, the outermost half a spacing inside: balls and cylinders roll, and fluids slip along
+    /// them. For balls, cylinders and tori; a box is the same either way.
+    Shells,
 }
 
 /// Copies of a rigid body.
@@ -564,6 +581,9 @@ pub struct Static {
     pub name: Option<String>,
     /// Its shape in its own frame.
     pub shape: Shape,
+    /// How its particles stand.
+    #[serde(default)]
+    pub fill: Fill,
     /// Where the origin of the shape's frame is put (m).
     #[serde(default)]
     pub position: [f64; 3],

@@ -1,6 +1,7 @@
 //! A shape becomes particles with the mass properties of the exact shape (E19).
 
-use super::{Region, Scene, Shape};
+use super::shells::shells;
+use super::{Fill, Region, Scene, Shape};
 use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::voxelize::{Resolution, VoxelizeOptions, voxelize};
@@ -21,6 +22,8 @@ pub struct Solid {
     pub inertia: DMat3,
     /// The mesh the shape was given as, scaled.
     pub mesh: Option<Arc<Mesh>>,
+    /// Whether the particles stand in shells, not on a lattice.
+    pub shells: bool,
     /// What looks doubtful.
     pub warnings: Vec<String>,
 }
@@ -29,7 +32,25 @@ pub struct Solid {
 const MOST: f64 = 2e8;
 
 impl Scene {
-    /// Fills a shape with particles. `key` is the shape's path in the scene, for messages.
+    /// Fills the shape of a body as it asks. `key` is the path of the body in the scene, for messages.
+    ///
+    /// # Errors
+    /// Those of [`Scene::solid`]; shells of a shape that has none.
+    pub fn body_solid(&self, shape: &Shape, fill: Fill, key: &str) -> Result<Solid> {
+        let solid = self.solid(shape, &format!("{key}.shape"))?;
+        if fill == Fill::Lattice || matches!(shape, Shape::Box(_)) {
+            return Ok(solid);
+        }
+        match shells(shape, self.resolution.spacing, self.world.dimensions == 2) {
+            Some(points) => Ok(Solid { points, shells: true, ..solid }),
+            None => {
+                let message = format!("`{key}`: only balls, cylinders and tori can be filled in shells");
+                Err(self.error(&format!("{key}.fill"), message, "leave `fill` out: a lattice fills any shape"))
+            }
+        }
+    }
+
+    /// Fills a shape with particles on a lattice. `key` is the shape's path in the scene, for messages.
     ///
     /// # Errors
     /// Extents that are not positive, a mesh that cannot be read or used, too many particles.
@@ -90,7 +111,7 @@ impl Scene {
                         }
                     }
                 }
-                Ok(Solid { points, volume, center, inertia, mesh: None, warnings: vec![] })
+                Ok(Solid { points, volume, center, inertia, mesh: None, shells: false, warnings: vec![] })
             }
             Shape::Sphere { center, radius } => {
                 positive("radius", *radius)?;
@@ -103,7 +124,7 @@ impl Scene {
                 };
                 fits(volume)?;
                 let points = lattice(center, DVec3::splat(r), dx, flat, |p| p.length_squared() < r * r);
-                Ok(Solid { points, volume, center, inertia, mesh: None, warnings: vec![] })
+                Ok(Solid { points, volume, center, inertia, mesh: None, shells: false, warnings: vec![] })
             }
             Shape::Cylinder { center, axis, radius, height } => {
                 positive("radius", *radius)?;
@@ -121,7 +142,7 @@ impl Scene {
                     fits(volume)?;
                     let inertia = DMat3::from_diagonal(DVec3::Y) * (0.5 * PI * r.powi(4));
                     let points = lattice(center, DVec3::splat(r), dx, true, |p| p.length_squared() < r * r);
-                    return Ok(Solid { points, volume, center, inertia, mesh: None, warnings: vec![] });
+                    return Ok(Solid { points, volume, center, inertia, mesh: None, shells: false, warnings: vec![] });
                 }
                 let volume = PI * r * r * h;
                 fits(volume)?;
@@ -133,7 +154,7 @@ impl Scene {
                     let z = p.dot(axis);
                     z.abs() < 0.5 * h && (p - axis * z).length_squared() < r * r
                 });
-                Ok(Solid { points, volume, center, inertia, mesh: None, warnings: vec![] })
+                Ok(Solid { points, volume, center, inertia, mesh: None, shells: false, warnings: vec![] })
             }
             Shape::Torus { center, axis, radius, tube } => {
                 let (axis, center) = (DVec3::from(*axis), DVec3::from(*center));
@@ -155,7 +176,7 @@ impl Scene {
                     let z = p.dot(axis);
                     ((p - axis * z).length() - big).hypot(z) < small
                 });
-                Ok(Solid { points, volume, center, inertia, mesh: None, warnings: vec![] })
+                Ok(Solid { points, volume, center, inertia, mesh: None, shells: false, warnings: vec![] })
             }
             Shape::Mesh { path, scale } => self.mesh_solid(path, *scale, key),
             Shape::Difference { from, cut } => self.difference(from, cut, key),
@@ -179,7 +200,7 @@ impl Scene {
                 if flat {
                     inertia = DMat3::from_diagonal(DVec3::Y * inertia.y_axis.y);
                 }
-                Ok(Solid { points, volume: n * cell, center, inertia, mesh: None, warnings: vec![] })
+                Ok(Solid { points, volume: n * cell, center, inertia, mesh: None, shells: false, warnings: vec![] })
             }
         }
     }
@@ -244,7 +265,7 @@ impl Scene {
             let solid = self.solid(&Shape::Points(given), key)?;
             (volume, center, inertia) = (solid.volume, solid.center, solid.inertia);
         }
-        Ok(Solid { points, volume, center, inertia, mesh: Some(Arc::new(mesh)), warnings })
+        Ok(Solid { points, volume, center, inertia, mesh: Some(Arc::new(mesh)), shells: false, warnings })
     }
 
     fn load_mesh(&self, path: &str, key: &str) -> Result<Mesh> {

@@ -613,6 +613,7 @@ pub fn to_touch(from: &Touch) -> crate::state::Touch {
         contacts: from.contact[3] as u32,
         sharers: from.fluid[3],
         deep: from.couple[3] as u32,
+        forgotten: 0,
     }
 }
 
