@@ -54,7 +54,8 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     bar.finish_and_clear();
     outputs.finish()?;
     let summary = recorder.summary(&world);
-    say(&describe(&summary, &folder));
+    let drawn = args.save.iter().any(|kind| kind.is_picture());
+    say(&describe(&summary, &folder, drawn));
     if let Some(fault) = world.fault() {
         return Err(fault.clone().into());
     }
@@ -99,7 +100,7 @@ fn name_of(scene: &str) -> &OsStr {
     Path::new(scene).file_stem().unwrap_or(scene.as_ref())
 }
 
-fn describe(s: &Summary, folder: &Path) -> String {
+fn describe(s: &Summary, folder: &Path, drawn: bool) -> String {
     let bound = s.dt_bound.map_or(String::new(), |b| format!(", bounded by {}", b.name()));
     let bodies = match s.bodies {
         0 => String::new(),
@@ -116,8 +117,10 @@ fn describe(s: &Summary, folder: &Path) -> String {
     let given_up =
         if s.forgotten_slips > 0 { format!(" ({} slips forgotten)", s.forgotten_slips) } else { String::new() };
     let left = if s.left > 0 { format!(" ({} left through open sides)", s.left) } else { String::new() };
+    let drawn = if drawn { ", pictures drawn meanwhile" } else { "" };
+    let wall = format!("{} in {}{drawn}", seconds(s.time), seconds(s.wall_s));
     let mut rows = vec![
-        ("real-time factor", format!("{:.3}  ({} in {})", s.real_time_factor, seconds(s.time), seconds(s.wall_s))),
+        ("real-time factor", format!("{:.3}  ({wall})", s.real_time_factor)),
         ("steps", format!("{}, mean {}{bound}", s.steps, seconds(s.dt))),
         ("particles", format!("{} fluid{bodies}{agents}", s.fluid)),
         (

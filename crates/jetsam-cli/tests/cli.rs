@@ -174,6 +174,26 @@ fn the_last_frame_ends_with_the_run() {
 }
 
 #[test]
+fn pictures_are_complete_when_a_run_ends_and_one_that_cannot_be_written_ends_it() {
+    let dir = folder("pictures");
+    let file = scene(&dir, POOL);
+    let run = ["run", &file, "--frames", "3", "--size", "32x24", "--save", "png", "--renderer", "cpu", "--out", "o"];
+    good(&dir, &run);
+    let picture = |frame: u32| dir.join(format!("o/frame_{frame:05}.png"));
+    for frame in 0..=3 {
+        // the header of a PNG says how large it is, and its last chunk that it is whole
+        let bytes = std::fs::read(picture(frame)).unwrap();
+        assert_eq!(bytes[16..24], [0, 0, 0, 32, 0, 0, 0, 24]);
+        assert_eq!(&bytes[bytes.len() - 8..bytes.len() - 4], b"IEND");
+    }
+    std::fs::remove_file(picture(1)).unwrap();
+    std::fs::create_dir(picture(1)).unwrap();
+    let out = jetsam(&dir, &run);
+    assert_eq!(out.status.code(), Some(2), "{}", text(&out.stderr));
+    assert!(text(&out.stderr).contains("frame_00001.png"), "{}", text(&out.stderr));
+}
+
+#[test]
 fn too_many_lost_particles_are_status_1() {
     let dir = folder("lost");
     // a step a thousand times too long throws particles through the walls

@@ -10,16 +10,17 @@ use jetsam::{FrameStats, Scene, World};
 use jetsam_view::{Animation, Ball, Camera, Frame, Image, Options, Show, Style, color, paint, render};
 use miette::{IntoDiagnostic, miette};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::JoinHandle;
 
 const WIDTH: usize = 1280;
 const HEIGHT: usize = 720;
 
-/// Draws every frame.
+/// Draws every frame. The run goes on meanwhile: of two processors one is idle at times in either.
 pub struct Pictures {
-    folder: Option<PathBuf>,
-    video: Option<Video>,
-    animation: Option<(PathBuf, Animation)>,
     painter: Painter,
+    desk: Desk,
 }
 
 impl Pictures {
@@ -31,10 +32,34 @@ impl Pictures {
         scene: &Scene,
         world: &World,
     ) -> miette::Result<Self> {
-        let name = folder.file_name().unwrap_or("video".as_ref());
-        let path = folder.join(name);
-        let rate = scene.run.frames_per_second;
         let [width, height] = pictures.size;
+        let binder = Binder::create(folder, save, pictures.size, scene.run.frames_per_second)?;
+        let show = Show::new(scene, world, width as f32 / height as f32);
+        Ok(Self { painter: Painter::new(artist, show, pictures)?, desk: Desk::open(binder) })
+    }
+}
+
+impl Writer for Pictures {
+    fn write(&mut self, world: &World, stats: &FrameStats) -> miette::Result<()> {
+        let sheet = self.painter.sheet(world)?;
+        self.desk.lay(stats.frame, sheet)
+    }
+
+    fn finish(&mut self) -> miette::Result<()> {
+        self.desk.close()
+    }
+}
+
+/// Where pictures go.
+struct Binder {
+    folder: Option<PathBuf>,
+    video: Option<Video>,
+    animation: Option<(PathBuf, Animation)>,
+}
+
+impl Binder {
+    fn create(folder: &Path, save: &[Save], [width, height]: [usize; 2], rate: f64) -> miette::Result<Self> {
+        let path = folder.join(folder.file_name().unwrap_or("video".as_ref()));
         let wants = |kind| save.contains(&kind);
         let video = wants(Save::Mp4).then(|| Video::create(path.with_extension("mp4"), width, height, rate));
         let mut animation = None;
@@ -43,26 +68,17 @@ impl Pictures {
             let opened = Animation::create(&path, width, height, rate).map_err(at(&path))?;
             animation = Some((path, opened));
         }
-        let show = Show::new(scene, world, width as f32 / height as f32);
-        Ok(Self {
-            folder: wants(Save::Png).then(|| folder.into()),
-            video: video.transpose()?,
-            animation,
-            painter: Painter::new(artist, show, pictures)?,
-        })
+        Ok(Self { folder: wants(Save::Png).then(|| folder.into()), video: video.transpose()?, animation })
     }
-}
 
-impl Writer for Pictures {
-    fn write(&mut self, world: &World, stats: &FrameStats) -> miette::Result<()> {
-        let image = self.painter.paint(world)?;
+    fn add(&mut self, number: u64, image: &Image) -> miette::Result<()> {
         if let Some(folder) = &self.folder {
-            image.save_png(frame_path(folder, stats.frame, "png")).into_diagnostic()?;
+            image.save_png(frame_path(folder, number, "png")).into_diagnostic()?;
         }
         if let Some((path, animation)) = &mut self.animation {
-            animation.add(&image).map_err(at(path))?;
+            animation.add(image).map_err(at(path))?;
         }
-        self.video.as_mut().map_or(Ok(()), |video| video.write(&image))
+        self.video.as_mut().map_or(Ok(()), |video| video.write(image))
     }
 
     fn finish(&mut self) -> miette::Result<()> {
@@ -70,6 +86,57 @@ impl Writer for Pictures {
             animation.finish().map_err(at(path))?;
         }
         self.video.as_mut().map_or(Ok(()), Video::finish)
+    }
+}
+
+/// What is laid on the desk: a picture, or what is left to do to have one.
+type Sheet = Box<dyn FnOnce() -> Image + Send>;
+
+/// A thread of its own that draws and writes, sheet by sheet; one may wait while another is in work.
+struct Desk {
+    sheets: Option<SyncSender<(u64, Sheet)>>,
+    work: Option<JoinHandle<miette::Result<()>>>,
+}
+
+impl Desk {
+    fn open(mut binder: Binder) -> Self {
+        let (sheets, laid) = sync_channel::<(u64, Sheet)>(1);
+        let work = std::thread::spawn(move || {
+            for (number, sheet) in laid {
+                binder.add(number, &sheet())?;
+            }
+            binder.finish()
+        });
+        Self { sheets: Some(sheets), work: Some(work) }
+    }
+
+    /// Hands over a sheet; says so if one before could not be written.
+    fn lay(&mut self, number: u64, sheet: Sheet) -> miette::Result<()> {
+        match self.sheets.as_ref().map(|sheets| sheets.send((number, sheet))) {
+            Some(Err(_)) => self.close(),
+            _ => Ok(()),
+        }
+    }
+
+    /// Waits until everything is written.
+    fn close(&mut self) -> miette::Result<()> {
+        self.sheets = None;
+        match self.work.take().map(JoinHandle::join) {
+            Some(Ok(outcome)) => outcome,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Drop for Desk {
+    /// A run that ends early leaves the pictures it has made.
+    fn drop(&mut self) {
+        self.sheets = None;
+        if let Some(work) = self.work.take() {
+            // what went wrong has been said, or the run ends for a reason of its own
+            let _ = work.join();
+        }
     }
 }
 
@@ -127,48 +194,40 @@ fn open() -> Result<Gpu, GpuError> {
     Err(GpuError::NotBuilt)
 }
 
-/// Draws moments of a world.
+/// Who draws moments of a world.
 enum Painter {
-    Cpu {
-        show: Box<Show>,
-        size: [usize; 2],
-        style: Style,
-        legend: bool,
-        frame: Frame,
-    },
+    /// The processor, at the desk.
+    Processor { show: Arc<Show>, size: [usize; 2], legend: Option<Style> },
     #[cfg(feature = "gpu")]
-    Gpu {
-        studio: Box<jetsam_view::gpu::Studio>,
-        style: Style,
-        legend: bool,
-        frame: Frame,
-        curves: jetsam_view::Curves,
-    },
+    Gpu { studio: Box<jetsam_view::gpu::Studio>, style: Style, legend: bool, frame: Frame, curves: jetsam_view::Curves },
 }
 
 impl Painter {
     fn new(artist: Artist, show: Show, pictures: &PictureArgs) -> miette::Result<Self> {
-        let (size, frame, style, legend) = (pictures.size, Frame::default(), artist.style, pictures.legend);
+        let (size, style, legend) = (pictures.size, artist.style, pictures.legend);
         match artist.gpu {
             #[cfg(feature = "gpu")]
             Some(gpu) => {
                 let [width, height] = size.map(|s| s as u32);
                 let studio = jetsam_view::gpu::Studio::new(gpu, show, width, height)?.into();
-                Ok(Self::Gpu { studio, style, legend, frame, curves: Default::default() })
+                Ok(Self::Gpu { studio, style, legend, frame: Frame::default(), curves: Default::default() })
             }
-            _ => Ok(Self::Cpu { show: show.into(), size, style, legend, frame }),
+            _ => Ok(Self::Processor { show: show.into(), size, legend: legend.then_some(style) }),
         }
     }
 
-    fn paint(&mut self, world: &World) -> miette::Result<Image> {
+    fn sheet(&mut self, world: &World) -> miette::Result<Sheet> {
         match self {
-            Self::Cpu { show, size: [width, height], style, legend: wanted, frame } => {
-                frame.take(world);
-                let mut image = paint(show, frame, *width, *height);
-                if *wanted {
-                    jetsam_view::legend(&mut image, show, style);
-                }
-                Ok(image)
+            Self::Processor { show, size: [width, height], legend } => {
+                let (frame, show, legend) = (Frame::of(world), Arc::clone(show), legend.clone());
+                let [width, height] = [*width, *height];
+                Ok(Box::new(move || {
+                    let mut image = paint(&show, &frame, width, height);
+                    if let Some(style) = &legend {
+                        jetsam_view::legend(&mut image, &show, style);
+                    }
+                    image
+                }))
             }
             #[cfg(feature = "gpu")]
             Self::Gpu { studio, style, legend: wanted, frame, curves } => {
@@ -183,7 +242,7 @@ impl Painter {
                 if *wanted {
                     jetsam_view::legend(&mut image, studio.show(), style);
                 }
-                Ok(image)
+                Ok(Box::new(|| image))
             }
         }
     }
