@@ -199,7 +199,13 @@ enum Painter {
     /// The processor, at the desk.
     Processor { show: Arc<Show>, size: [usize; 2], legend: Option<Style> },
     #[cfg(feature = "gpu")]
-    Gpu { studio: Box<jetsam_view::gpu::Studio>, style: Style, legend: bool, frame: Frame, curves: jetsam_view::Curves },
+    Gpu {
+        studio: Box<jetsam_view::gpu::Studio>,
+        style: Style,
+        legend: bool,
+        frame: Box<Frame>,
+        curves: jetsam_view::Curves,
+    },
 }
 
 impl Painter {
@@ -210,7 +216,7 @@ impl Painter {
             Some(gpu) => {
                 let [width, height] = size.map(|s| s as u32);
                 let studio = jetsam_view::gpu::Studio::new(gpu, show, width, height)?.into();
-                Ok(Self::Gpu { studio, style, legend, frame: Frame::default(), curves: Default::default() })
+                Ok(Self::Gpu { studio, style, legend, frame: Box::default(), curves: Default::default() })
             }
             _ => Ok(Self::Processor { show: show.into(), size, legend: legend.then_some(style) }),
         }
