@@ -34,43 +34,41 @@ pub struct Block(pub Lanes);
 #[repr(C, align(64))]
 pub struct Indices(pub [u32; LANES]);
 
-/// Copies `len` numbers of each line from `begin` on, moved by its `shift`, to `at`, and where they came from to `index`, if that is
-/// asked for: by whole vectors, so that up to fifteen numbers beyond `len` are read and written.
+/// Copies `len` numbers of each axis from `begin` on, moved by its `shift`, to `at`, and where they came from to `index`: by whole
+/// vectors, so that up to fifteen numbers beyond `len` are read and written.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-pub fn pack<S: Simd, const N: usize>(
+pub fn pack<S: Simd>(
     simd: S,
-    from: &[Vec<f32>; N],
+    from: &[Vec<f32>; 3],
     begin: usize,
-    shift: [f32; N],
-    to: &mut [Vec<Block>; N],
-    index: Option<&mut [Indices]>,
+    shift: [f32; 3],
+    to: &mut [Vec<Block>; 3],
+    index: &mut [Indices],
     at: usize,
     len: usize,
 ) {
     let (read, write) = (begin + padded(len), at + padded(len));
     assert!(from.iter().all(|x| read <= x.len()) && to.iter().all(|x| write <= LANES * x.len()));
-    assert!(index.as_ref().is_none_or(|i| write <= LANES * i.len()));
-    // loops: the compiler calls a map of six, for the plain machine
-    let (mut source, mut target) = ([std::ptr::null(); N], [std::ptr::null_mut(); N]);
-    let mut by = [f32x16::splat(simd, 0.0); N];
-    for a in 0..N {
+    assert!(write <= LANES * index.len());
+    // loops: the compiler calls a map, for the plain machine
+    let (mut source, mut target) = ([std::ptr::null(); 3], [std::ptr::null_mut(); 3]);
+    let mut by = [f32x16::splat(simd, 0.0); 3];
+    for a in 0..3 {
         source[a] = from[a].as_ptr();
         target[a] = to[a].as_mut_ptr().cast::<f32>();
         by[a] = f32x16::splat(simd, shift[a]);
     }
-    let index = index.map(|i| i.as_mut_ptr().cast::<u32>());
+    let index = index.as_mut_ptr().cast::<u32>();
     let mut next = u32x16::from_fn(simd, |l| l as u32) + u32x16::splat(simd, begin as u32);
     for k in (0..len).step_by(LANES) {
         // SAFETY: k + 16 <= padded(len), and the ends are asserted above
         unsafe {
-            for a in 0..N {
+            for a in 0..3 {
                 let x = f32x16::load_array_ref(simd, &*source[a].add(begin + k).cast());
                 (x + by[a]).store_array(&mut *target[a].add(at + k).cast());
             }
-            if let Some(index) = index {
-                next.store_array(&mut *index.add(at + k).cast());
-            }
+            next.store_array(&mut *index.add(at + k).cast());
         }
         next += u32x16::splat(simd, LANES as u32);
     }

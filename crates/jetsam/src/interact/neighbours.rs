@@ -245,7 +245,7 @@ impl Tile {
         }
         let mut at = 0;
         for row in rows {
-            pack(simd, &around.places.x, row.begin, row.shift, &mut self.x, Some(&mut self.index), at, row.len);
+            pack(simd, &around.places.x, row.begin, row.shift, &mut self.x, &mut self.index, at, row.len);
             if owners {
                 let owner: &mut [u32] = bytemuck::cast_slice_mut(&mut self.owner);
                 owner[at..at + row.len].copy_from_slice(&around.owner[row.begin..row.begin + row.len]);
