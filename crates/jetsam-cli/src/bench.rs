@@ -11,7 +11,7 @@ use jetsam::{Scene, World, state_hash};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
-const HEADER: &str = "scene            particles  neighbours  ms/step  Mparticle-steps/s  real-time  density err  peak MB  state hash\n                 milliseconds a step by stage";
+const HEADER: &str = "scene            particles  neighbours  ms/step  Mparticle-steps/s  real-time  density err  rounds  peak MB  state hash\n                 milliseconds a step by stage";
 
 /// What is said of a case.
 #[derive(Serialize)]
@@ -30,6 +30,8 @@ struct Case {
     particle_steps_per_s: f64,
     real_time_factor: f64,
     density_error_mean: f64,
+    /// Rounds of implicit pressure a step, of all its solves; 0 where pressure is not implicit.
+    rounds: f64,
     /// Most memory held at once since the case began (MB).
     peak_mb: f64,
     threads: usize,
@@ -127,7 +129,8 @@ fn measure(name: &str, scene: &Scene, args: &args::Bench, finite: &mut bool) -> 
     };
     run(&mut world, steps.div_ceil(5));
     let timers: Vec<Duration> = world.timers().map(|t| t.1).collect();
-    let (begin, start) = (world.time(), Instant::now());
+    let rounds = |world: &World| world.solves().pressure + world.solves().divergence;
+    let (begin, before, start) = (world.time(), rounds(&world), Instant::now());
     *finite &= run(&mut world, steps);
     let wall = start.elapsed().as_secs_f64();
     bar.finish_and_clear();
@@ -152,6 +155,7 @@ fn measure(name: &str, scene: &Scene, args: &args::Bench, finite: &mut bool) -> 
         particle_steps_per_s: particles as f64 * steps as f64 / wall,
         real_time_factor: (world.time() - begin) / wall,
         density_error_mean: world.ledger().density_error_mean,
+        rounds: (rounds(&world) - before) as f64 / steps as f64,
         peak_mb: f64::from(MEMORY.peak_usage_as_mb()),
         threads: rayon::current_num_threads(),
         stage_ms,
@@ -163,7 +167,7 @@ fn line(c: &Case) -> String {
     let stages = c.stage_ms.0.iter().filter(|s| s.1 >= 5e-4);
     let stages: Vec<String> = stages.map(|(stage, ms)| format!("{} {ms:.2}", stage.name())).collect();
     format!(
-        "{:16} {:9}  {:10.1}  {:7.2}  {:17.2}  {:9.4}  {:9.3} %  {:7.0}  {}\n{:17}{}",
+        "{:16} {:9}  {:10.1}  {:7.2}  {:17.2}  {:9.4}  {:9.3} %  {:6.1}  {:7.0}  {}\n{:17}{}",
         c.scene,
         c.particles,
         c.neighbours,
@@ -171,6 +175,7 @@ fn line(c: &Case) -> String {
         1e-6 * c.particle_steps_per_s,
         c.real_time_factor,
         100.0 * c.density_error_mean,
+        c.rounds,
         c.peak_mb,
         c.state_hash,
         "",

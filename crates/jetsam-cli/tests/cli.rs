@@ -252,7 +252,7 @@ fn bench_and_check_say_what_the_contract_says() {
             case,
             "scene backend device particles neighbours steps ms_per_step particle_steps_per_s real_time_factor",
         );
-        assert_keys(case, "density_error_mean peak_mb threads stage_ms state_hash");
+        assert_keys(case, "density_error_mean rounds peak_mb threads stage_ms state_hash");
         assert_eq!((&case["steps"], &case["backend"]), (&5.into(), &"cpu".into()));
         let particles = case["particles"].as_f64().unwrap();
         assert!((0.7..1.6).contains(&(particles / wanted)), "{particles} for {wanted}");
