@@ -260,7 +260,12 @@ impl Model {
             && s.xsph == 0.0
             && s.shifting == 0.0
             && s.vorticity == 0.0
-            && self.fluids.iter().all(|f| f.cohesion == 0.0 && f.curvature == 0.0)
+            && !self.tension()
+    }
+
+    /// Whether any fluid has surface tension (E7).
+    pub fn tension(&self) -> bool {
+        self.fluids.iter().any(|f| f.cohesion + f.curvature > 0.0)
     }
 
     /// Whether pressure is implicit (E9): found by iteration, in steps that the flow bounds.

@@ -13,6 +13,7 @@ use crate::integrate::{Advance, bodies, joints, particles, sources};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::contacts::Surfaces;
 use crate::interact::neighbours::{Around, NeighbourChunk, Places, with_scratch};
+use crate::interact::slices::Slices;
 use crate::interact::{CHUNK, boundary, density, forces, gradients, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
@@ -30,6 +31,9 @@ pub struct Cpu {
     level: Level,
     state: State,
     cells: [Cells; Kind::COUNT],
+    /// Neighbours of fluids.
+    slices: Vec<Slices>,
+    /// Neighbours of rigid and static bodies' particles; the first is empty.
     neighbours: [Vec<NeighbourChunk>; Kind::COUNT],
     /// The other half of the double buffers of `cells`.
     spare: Spare,
@@ -85,6 +89,7 @@ impl Default for Cpu {
             level: Level::new(),
             state: State::default(),
             cells: Default::default(),
+            slices: Vec::new(),
             neighbours: Default::default(),
             spare: Spare::default(),
             places: Places::default(),
@@ -384,17 +389,16 @@ impl Cpu {
         let p = &mut self.state.particles;
         let around = around!(self, p, model, true);
         let (n, level) = (p.count[Kind::Fluid as usize], self.level);
-        let chunks = &mut self.neighbours[Kind::Fluid as usize];
-        chunks.resize_with(n.div_ceil(CHUNK), NeighbourChunk::default);
+        self.slices.resize_with(n.div_ceil(CHUNK), Slices::default);
         let density = match model.solver.density {
             Density::Summation => &mut p.density,
             Density::Continuity => &mut self.summed,
         };
         density.resize(n.max(density.len()), 1.0);
-        chunks.par_iter_mut().zip(chunks_mut!(density, ..n)).enumerate().for_each(|(c, (chunk, density))| {
+        self.slices.par_iter_mut().zip(chunks_mut!(density, ..n)).enumerate().for_each(|(c, (slices, density))| {
             let members = c * CHUNK..((c + 1) * CHUNK).min(n);
             with_scratch(|scratch| {
-                dispatch!(level, simd => density::fluid_chunk(simd, scratch, model, around, members, chunk, density));
+                dispatch!(level, simd => density::fluid_chunk(simd, scratch, model, around, members, slices, density));
             });
         });
         self.find_bodies(model, &[Kind::Rigid, Kind::Static], true);
@@ -477,15 +481,13 @@ impl Cpu {
         }
         let (records, owner, level) = (&p.record, &p.owner, self.level);
         let n = p.count[Kind::Fluid as usize];
-        chunks_mut!(p.gradient, ..n)
-            .zip(chunks_mut!(p.vorticity, ..n))
-            .zip(&self.neighbours[Kind::Fluid as usize])
-            .enumerate()
-            .for_each(|(c, ((gradient, vorticity), chunk))| {
+        chunks_mut!(p.gradient, ..n).zip(chunks_mut!(p.vorticity, ..n)).zip(&self.slices).for_each(
+            |((gradient, vorticity), slices)| {
                 dispatch!(level, simd => {
-                    gradients::chunk(simd, model, records, owner, c * CHUNK, chunk, gradient, vorticity);
+                    gradients::chunk(simd, model, records, owner, slices, gradient, vorticity);
                 });
-            });
+            },
+        );
     }
 
     fn forces(&mut self, model: &Model, advance: Advance, kinds: &[Kind]) {
@@ -504,72 +506,50 @@ impl Cpu {
         let bodies_first = p.first[Kind::Rigid as usize];
         let (mirror, gradient) = (&self.mirror[..], &p.gradient[..]);
         let (dt, fastest) = (advance.dt as f32, self.ledger.speed as f32);
+        let input = |first: usize| forces::Input {
+            model,
+            records,
+            mirror,
+            gradient,
+            owner,
+            first,
+            particle_mass,
+            surfaces,
+            gravity,
+            dt,
+            fastest,
+        };
         for &kind in kinds {
             let first = p.first[kind as usize];
-            let segment = first..first + p.count[kind as usize];
-            let chunks = p.push[segment].par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).enumerate();
-            let work = |c: usize,
-                        push: &mut [[f32; 3]],
-                        chunk: &NeighbourChunk,
-                        carry: &mut _,
-                        vorticity: &mut _,
-                        touch: &mut [Touch],
-                        slips: &mut Vec<Slips>| {
+            let push = &mut p.push[first..first + p.count[kind as usize]];
+            if kind == Kind::Fluid {
+                // what nobody asks for is empty
+                let (mut carry, mut vorticity) = (p.carry.chunks_mut(CHUNK), p.vorticity.chunks_mut(CHUNK));
+                let out = push.chunks_mut(CHUNK).map(|push| forces::OnFluids {
+                    push,
+                    carry: carry.next().unwrap_or_default(),
+                    vorticity: vorticity.next().unwrap_or_default(),
+                });
+                let chunks = out.collect::<Vec<_>>().into_par_iter().zip(&self.slices).enumerate();
+                chunks.for_each(|(c, (out, slices))| {
+                    dispatch!(level, simd => forces::fluids(simd, input(first + c * CHUNK), slices, out));
+                });
+                continue;
+            }
+            let touch = p.touch[first - bodies_first..].par_chunks_mut(CHUNK);
+            // what stands remembers nothing
+            let slips = &mut self.slips[usize::from(kind == Kind::Static)];
+            slips.resize_with(p.count[kind as usize].div_ceil(CHUNK), Vec::new);
+            let chunks =
+                push.par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).zip(touch).zip(slips).enumerate();
+            chunks.for_each(|(c, (((push, chunk), touch), slips))| {
                 if !chunk.found && kind == Kind::Static {
                     touch.fill(Touch::default());
                     return push.fill([0.0; 3]);
                 }
-                let first = first + c * CHUNK;
-                let input = forces::Input {
-                    model,
-                    records,
-                    mirror,
-                    gradient,
-                    owner,
-                    first,
-                    particle_mass,
-                    surfaces,
-                    gravity,
-                    dt,
-                    fastest,
-                };
-                let out = forces::Output { push, carry, vorticity, touch, slips };
-                dispatch!(level, simd => forces::chunk(simd, input, kind, chunk, out));
-            };
-            if kind != Kind::Fluid {
-                let touch = p.touch[first - bodies_first..].par_chunks_mut(CHUNK);
-                // what stands remembers nothing
-                let slips = &mut self.slips[usize::from(kind == Kind::Static)];
-                slips.resize_with(p.count[kind as usize].div_ceil(CHUNK), Vec::new);
-                chunks.zip(touch).zip(slips).for_each(|(((c, (push, chunk)), touch), slips)| {
-                    work(c, push, chunk, &mut [], &mut [], touch, slips);
-                });
-                continue;
-            }
-            match (!p.carry.is_empty(), !gradient.is_empty()) {
-                (true, true) => {
-                    let (carry, vorticity) = (p.carry.par_chunks_mut(CHUNK), p.vorticity.par_chunks_mut(CHUNK));
-                    let all = chunks.zip(carry).zip(vorticity);
-                    all.for_each(|(((c, (push, chunk)), carry), vorticity)| {
-                        work(c, push, chunk, carry, vorticity, &mut [], &mut Vec::new())
-                    });
-                }
-                (true, false) => {
-                    let all = chunks.zip(p.carry.par_chunks_mut(CHUNK));
-                    all.for_each(|((c, (push, chunk)), carry)| {
-                        work(c, push, chunk, carry, &mut [], &mut [], &mut Vec::new())
-                    });
-                }
-                (false, true) => {
-                    let all = chunks.zip(p.vorticity.par_chunks_mut(CHUNK));
-                    all.for_each(|((c, (push, chunk)), vorticity)| {
-                        work(c, push, chunk, &mut [], vorticity, &mut [], &mut Vec::new())
-                    });
-                }
-                (false, false) => chunks.for_each(|(c, (push, chunk))| {
-                    work(c, push, chunk, &mut [], &mut [], &mut [], &mut Vec::new());
-                }),
-            }
+                let out = forces::OnBodies { push, touch, slips };
+                dispatch!(level, simd => forces::bodies(simd, input(first + c * CHUNK), kind, chunk, out));
+            });
         }
     }
 
@@ -651,7 +631,7 @@ impl Cpu {
         let fluid = p.segment(Kind::Fluid);
         let n = fluid.len();
         self.sums.resize_with(n.div_ceil(CHUNK), Ledger::default);
-        let neighbours = &self.neighbours[0];
+        let slices = &self.slices;
         self.sums.par_iter_mut().enumerate().for_each(|(c, sum)| {
             let range = c * CHUNK..((c + 1) * CHUNK).min(n);
             *sum = Ledger::default();
@@ -661,7 +641,7 @@ impl Cpu {
                 density: &p.density[range.clone()],
                 owner: &p.owner[range.clone()],
                 confined: p.vorticity.get(range).filter(|_| model.solver.vorticity > 0.0),
-                neighbours: &neighbours[c],
+                slices: &slices[c],
                 gravity,
             };
             part.tally(model, sum);
@@ -783,7 +763,7 @@ struct Part<'a> {
     density: &'a [f32],
     owner: &'a [u32],
     confined: Option<&'a [[f32; 3]]>,
-    neighbours: &'a NeighbourChunk,
+    slices: &'a Slices,
     gravity: DVec3,
 }
 
@@ -817,10 +797,9 @@ impl Part<'_> {
             sum.kinetic += 0.5 * mass * speed * speed;
             let x = DVec3::from(r.x.map(f64::from));
             sum.potential -= mass * model.gravity.dot(x - model.grid.min);
-            let runs = &self.neighbours.runs[k];
-            let fluid = runs.count(Kind::Fluid) as f64 - 1.0;
+            let fluid = self.slices.count(k, Kind::Fluid) as f64 - 1.0;
             sum.neighbours += fluid;
-            let all: usize = Kind::ALL.iter().map(|&kind| runs.count(kind)).sum();
+            let all: usize = Kind::ALL.iter().map(|&kind| self.slices.count(k, kind)).sum();
             if all as f64 >= 0.8 * model.full_support {
                 let error = f64::from((self.density[k] - 1.0).abs());
                 density_error += error;

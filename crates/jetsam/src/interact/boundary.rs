@@ -4,9 +4,10 @@
 //! extrapolated from the fluid around with the weight of the layer between, and never negative unless pressures may be;
 //! where walls do not slip, the velocity they show to viscosity: the fluid's, mirrored at the wall.
 
-use super::lanes::{LANES, Lanes, Listed, gather, sum};
+use super::lanes::{LANES, Lanes, gather, listed, sum};
 use super::neighbours::NeighbourChunk;
 use super::pairs::wrap_lanes;
+use super::slices::splat;
 use crate::laws::fluid;
 use crate::laws::kernel::each_kernel;
 use crate::model::Model;
@@ -38,7 +39,6 @@ pub fn chunk<S: Simd>(
         PressureForce::Mueller => 0.5, // its shares are half pressures
     };
     let floor = if model.solver.negative_pressure { f32::NEG_INFINITY } else { 0.0 };
-    let listed = Listed::new(simd, records, chunk.list());
     for (k, (runs, share)) in chunk.runs.iter().zip(share).enumerate() {
         *share = 0.0;
         let own = &records[first + k];
@@ -51,10 +51,11 @@ pub fn chunk<S: Simd>(
         let pull = half * (gravity - acceleration(&bodies[owner[first + k] as usize], own));
         let (mut total, mut weight): (Lanes, Lanes) = ([0.0; LANES], [0.0; LANES]);
         let mut flow: [Lanes; 3] = [[0.0; LANES]; 3];
-        for near in listed.run(runs.padded(Kind::Fluid)) {
+        let x = splat(own.x);
+        for near in listed(records, &chunk.list()[runs.padded(Kind::Fluid)]) {
             let list = near.index;
             let other = gather(simd, near);
-            let (d, mut r_sq) = wrap_lanes(simd, model, own.x, &other.x);
+            let (d, mut r_sq) = wrap_lanes(simd, model, &x, &other.x);
             for l in 0..LANES {
                 // padding names the particle itself: it goes where W is zero
                 r_sq[l] = if list[l] as usize == first + k { limit } else { r_sq[l] };

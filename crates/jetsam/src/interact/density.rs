@@ -5,6 +5,7 @@
 
 use super::lanes::{Block, LANES, Lanes, sum};
 use super::neighbours::{Around, NeighbourChunk, Scratch};
+use super::slices::Slices;
 use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
 use crate::scene::Coupling;
@@ -20,7 +21,7 @@ pub fn fluid_chunk<S: Simd>(
     model: &Model,
     around: Around,
     members: Range<usize>,
-    chunk: &mut NeighbourChunk,
+    slices: &mut Slices,
     density: &mut [f32],
 ) {
     let kernel = model.kernel.density();
@@ -32,7 +33,8 @@ pub fn fluid_chunk<S: Simd>(
         Coupling::Spring => &[Kind::Static],
     };
     let start = members.start;
-    chunk.find(
+    let mut rows = std::mem::take(&mut scratch.rows);
+    rows.find(
         simd,
         scratch,
         around,
@@ -58,6 +60,8 @@ pub fn fluid_chunk<S: Simd>(
             }
         },
     );
+    slices.set(simd, &rows, start);
+    scratch.rows = rows;
 }
 
 /// Neighbours of a chunk of bodies' particles.

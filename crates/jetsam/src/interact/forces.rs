@@ -6,9 +6,10 @@
 
 use super::contacts::{self, Friction, Surfaces};
 use super::gradients::confinement;
-use super::lanes::{LANES, Listed};
+use super::lanes::{LANES, listed};
 use super::neighbours::{NeighbourChunk, Runs};
 use super::pairs::{Ends, Pairs, Terms, wrap};
+use super::slices::{Own, Slices};
 use crate::laws::{contact, field};
 use crate::model::{CONTACT_REACH, Model};
 use crate::scene::{Coupling, Damping, Force};
@@ -43,113 +44,152 @@ pub struct Input<'a> {
     pub fastest: f32,
 }
 
-/// What the stage writes of a chunk. What a kind has not, or nobody asks for, is empty.
-pub struct Output<'a> {
-    /// Acceleration of fluids (m/s^2), force on bodies' particles (N).
+/// What the stage writes of a chunk of fluid. What nobody asks for is empty.
+pub struct OnFluids<'a> {
+    /// Acceleration (m/s^2).
     pub push: &'a mut [[f32; 3]],
     /// Velocity by which fluids are carried besides their own (m/s), and `dD/dt` (1/s).
     pub carry: &'a mut [[f32; 4]],
-    /// In: `curl v` of fluids (1/s). Out: the acceleration of confinement (m/s^2).
+    /// In: `curl v` (1/s). Out: the acceleration of confinement (m/s^2).
     pub vorticity: &'a mut [[f32; 3]],
-    /// Of what the forces on bodies' particles consist.
+}
+
+/// What the stage writes of a chunk of bodies' particles.
+pub struct OnBodies<'a> {
+    /// Force (N).
+    pub push: &'a mut [[f32; 3]],
+    /// Of what the forces consist.
     pub touch: &'a mut [Touch],
     /// Slips of the contacts of those that rub, in their order; [`Touch::slips`] tells whose.
     pub slips: &'a mut Vec<Slips>,
 }
 
-/// Forces on a chunk of particles of one kind.
+/// Forces on a chunk of fluid particles.
 #[inline(always)]
-pub fn chunk<S: Simd>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: Output) {
+pub fn fluids<S: Simd>(simd: S, input: Input, slices: &Slices, out: OnFluids) {
     // most scenes ask for no more than pressure and viscosity: the rest is then not even compiled in
     if input.model.plain() && input.mirror.is_empty() {
-        particles::<S, true>(simd, input, kind, chunk, out);
+        on_fluids::<S, true>(simd, input, slices, out);
     } else {
-        particles::<S, false>(simd, input, kind, chunk, out);
+        on_fluids::<S, false>(simd, input, slices, out);
+    }
+}
+
+/// Forces on a chunk of particles of bodies.
+#[inline(always)]
+pub fn bodies<S: Simd>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: OnBodies) {
+    if input.model.plain() && input.mirror.is_empty() {
+        on_bodies::<S, true>(simd, input, kind, chunk, out);
+    } else {
+        on_bodies::<S, false>(simd, input, kind, chunk, out);
     }
 }
 
 #[inline(always)]
-fn particles<S: Simd, const PLAIN: bool>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: Output) {
-    let Output { push, carry, vorticity, touch, slips } = out;
-    slips.clear();
-    let listed = Listed::new(simd, input.records, chunk.list());
+fn on_bodies<S: Simd, const PLAIN: bool>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: OnBodies) {
+    out.slips.clear();
     for (k, runs) in chunk.runs.iter().enumerate() {
         let i = input.first + k;
-        if kind != Kind::Fluid {
-            (push[k], touch[k]) = on_body::<S, PLAIN>(simd, &input, kind, listed, runs, i, slips);
-            continue;
-        }
-        let (pairs, mut total) = on_fluid::<S, PLAIN>(simd, &input, listed, runs, i);
-        if input.model.solver.vorticity > 0.0 {
-            let confined = confinement(input.model, pairs.growth(simd), Vec3::from(vorticity[k]));
-            total += confined;
-            vorticity[k] = confined.to_array();
-        }
-        push[k] = total.to_array();
-        if let Some(carry) = carry.get_mut(k) {
-            let [x, y, z] = pairs.carry(simd, input.fastest).to_array();
-            *carry = [x, y, z, pairs.rate(simd)];
+        (out.push[k], out.touch[k]) = on_body::<S, PLAIN>(simd, &input, kind, chunk.list(), runs, i, out.slips);
+    }
+}
+
+#[inline(always)]
+fn on_fluids<S: Simd, const PLAIN: bool>(simd: S, input: Input, slices: &Slices, out: OnFluids) {
+    let OnFluids { push, carry, vorticity } = out;
+    let model = input.model;
+    for (s, members) in slices.each() {
+        let pairs = pairs_of::<S, PLAIN>(simd, &input, slices, s);
+        for (l, k) in members.enumerate() {
+            let i = input.first + k;
+            let own = &input.records[i];
+            let owner = input.owner[i];
+            let mut contacts = Vec3::ZERO;
+            if slices.has(s, Kind::Rigid) || slices.has(s, Kind::Static) {
+                contacts = springs_on(&input, slices, k, own, owner);
+            }
+            let force = pairs.force(l) + contacts;
+            let mut total = force / model.fluids[owner as usize].mass + input.gravity + fields(model, own);
+            if !PLAIN && model.solver.vorticity > 0.0 {
+                let confined = confinement(model, pairs.growth(l), Vec3::from(vorticity[k]));
+                total += confined;
+                vorticity[k] = confined.to_array();
+            }
+            push[k] = total.to_array();
+            if let Some(carry) = carry.get_mut(k) {
+                let [x, y, z] = pairs.carry(l, input.fastest).to_array();
+                *carry = [x, y, z, pairs.rate(l)];
+            }
         }
     }
 }
 
-/// Sums over the pairs of a fluid particle, and its acceleration.
+/// Sums over the pairs of sixteen fluid particles.
 #[inline(always)]
-fn on_fluid<'a, S: Simd, const PLAIN: bool>(
-    simd: S,
-    input: &Input<'a>,
-    listed: Listed<'a>,
-    runs: &Runs,
-    i: usize,
-) -> (Pairs<'a>, Vec3) {
+fn pairs_of<'a, S: Simd, const PLAIN: bool>(simd: S, input: &Input<'a>, slices: &Slices, s: usize) -> Pairs<'a> {
     let model = input.model;
-    let own = &input.records[i];
-    let owner = input.owner[i];
-    let me = &model.fluids[owner as usize];
-    let mut pairs = Pairs::new(input, i, Some(owner));
-    let run = |kind| listed.run(runs.padded(kind));
-    let mut terms = Terms {
-        mu_sum: [2.0 * me.viscosity; LANES],
-        eta: [me.artificial; LANES],
-        same: [1.0; LANES],
-        cohesion: me.cohesion,
-        curvature: me.curvature,
-    };
-    for near in run(Kind::Fluid) {
+    let own = Own::slice(simd, input.records, slices, s);
+    let mut owner = [0; LANES];
+    let mut me = [&model.fluids[0]; LANES];
+    if model.fluids.len() > 1 {
+        for l in 0..LANES {
+            owner[l] = input.owner[own.i[l] as usize];
+            me[l] = &model.fluids[owner[l] as usize];
+        }
+    }
+    let mut terms = Terms::bare([2.0 * me[0].viscosity; LANES]);
+    (terms.eta, terms.same) = ([me[0].artificial; LANES], [1.0; LANES]);
+    if !PLAIN {
+        for l in 0..LANES {
+            (terms.cohesion[l], terms.curvature[l]) = (me[l].cohesion, me[l].curvature);
+        }
+    }
+    let mut pairs = Pairs::new(input, own, true);
+    for near in slices.run(input.records, s, Kind::Fluid) {
         if model.fluids.len() > 1 {
             for l in 0..LANES {
                 let other = input.owner[near.index[l] as usize];
-                terms.same[l] = if other == owner { 1.0 } else { 0.0 };
+                terms.same[l] = if other == owner[l] { 1.0 } else { 0.0 };
                 let other = &model.fluids[other as usize];
-                terms.mu_sum[l] = me.viscosity + other.viscosity;
-                terms.eta[l] = 0.5 * (me.artificial + other.artificial);
+                terms.mu_sum[l] = me[l].viscosity + other.viscosity;
+                terms.eta[l] = 0.5 * (me[l].artificial + other.artificial);
             }
         }
         pairs.add::<S, PLAIN>(simd, near, Ends::Fluids, &terms);
     }
     // walls: the fluid's own viscosity acts (unless they are free of it), the artificial one does not
-    let mu = if model.solver.walls_slip { 0.0 } else { 2.0 * me.viscosity };
-    let terms = Terms { mu_sum: [mu; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
-    for near in run(Kind::Static) {
+    let mut mu = [0.0; LANES];
+    if !model.solver.walls_slip {
+        for l in 0..LANES {
+            mu[l] = 2.0 * me[l].viscosity;
+        }
+    }
+    let terms = Terms::bare(mu);
+    for near in slices.run(input.records, s, Kind::Static) {
         pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
     }
-    for &j in listed.indices(runs.exact(Kind::Rigid)) {
-        input.surfaces.wet(input.owner[j as usize]);
-    }
     if model.solver.coupling == Coupling::Pressure {
-        for near in run(Kind::Rigid) {
+        for near in slices.run(input.records, s, Kind::Rigid) {
             pairs.add::<S, PLAIN>(simd, near, Ends::OnFluid, &terms);
         }
     }
+    pairs
+}
+
+/// Force of springs of bodies' particles on a fluid particle (N); bodies that sleep are told that it is there.
+#[inline(always)]
+fn springs_on(input: &Input, slices: &Slices, k: usize, own: &Record, owner: u32) -> Vec3 {
+    for j in slices.exact(k, Kind::Rigid) {
+        input.surfaces.wet(input.owner[j as usize]);
+    }
     let mut contacts = Vec3::ZERO;
     for kind in [Kind::Rigid, Kind::Static] {
-        if springs(model, kind, own) {
-            let list = listed.indices(runs.exact(kind));
-            contacts += sum_contacts(input, own, list, |(_, body)| Some(model.coupling_pair(owner, body)));
+        if springs(input.model, kind, own) {
+            let constants = |_: &Record, body| Some(input.model.coupling_pair(owner, body));
+            contacts += sum_contacts(input, own, slices.exact(k, kind), constants);
         }
     }
-    let push = (pairs.force(simd) + contacts) / me.mass + input.gravity + fields(model, own);
-    (pairs, push)
+    contacts
 }
 
 /// Force on a particle of a body, and of what it consists.
@@ -158,7 +198,7 @@ fn on_body<S: Simd, const PLAIN: bool>(
     simd: S,
     input: &Input,
     kind: Kind,
-    listed: Listed,
+    list: &[u32],
     runs: &Runs,
     i: usize,
     slips: &mut Vec<Slips>,
@@ -168,10 +208,9 @@ fn on_body<S: Simd, const PLAIN: bool>(
     let owner = input.owner[i];
     let mut force = Vec3::ZERO;
     if kind == Kind::Static || model.solver.coupling == Coupling::Pressure {
-        let mut pairs = Pairs::new(input, i, None);
-        let mut terms =
-            Terms { mu_sum: [0.0; LANES], eta: [0.0; LANES], same: [0.0; LANES], cohesion: 0.0, curvature: 0.0 };
-        for near in listed.run(runs.padded(Kind::Fluid)) {
+        let mut pairs = Pairs::new(input, Own::one(input.records, i), false);
+        let mut terms = Terms::bare([0.0; LANES]);
+        for near in listed(input.records, &list[runs.padded(Kind::Fluid)]) {
             if !model.solver.walls_slip {
                 for l in 0..LANES {
                     // padding names the particle itself, whose owner is a body
@@ -181,16 +220,16 @@ fn on_body<S: Simd, const PLAIN: bool>(
             }
             pairs.add::<S, PLAIN>(simd, near, Ends::OnBody, &terms);
         }
-        force += pairs.force(simd);
+        force += pairs.total(simd);
     }
-    let fluids = listed.indices(runs.exact(Kind::Fluid));
-    force += sum_contacts(input, own, fluids, |(other, fluid)| {
+    let fluids = list[runs.exact(Kind::Fluid)].iter().copied();
+    force += sum_contacts(input, own, fluids, |other, fluid| {
         springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
     });
     let mut touch = Touch { fluid: force.to_array(), ..Touch::default() };
     let mut friction = Friction::default();
     for other in [Kind::Rigid, Kind::Static] {
-        contacts::add(input, i, listed.indices(runs.exact(other)), &mut touch, &mut friction);
+        contacts::add(input, i, &list[runs.exact(other)], &mut touch, &mut friction);
     }
     force += Vec3::from(touch.contact);
     touch.forgotten = friction.forgotten;
@@ -217,14 +256,14 @@ fn springs(model: &Model, kind: Kind, fluid: &Record) -> bool {
 fn sum_contacts(
     input: &Input,
     own: &Record,
-    list: &[u32],
-    constants: impl Fn((&Record, u32)) -> Option<(f32, f32)>,
+    list: impl Iterator<Item = u32>,
+    constants: impl Fn(&Record, u32) -> Option<(f32, f32)>,
 ) -> Vec3 {
     let model = input.model;
     let diameter = model.contact_diameter as f32;
     let normal_only = if model.solver.damping == Damping::Normal { 1.0 } else { 0.0 };
     let mut total = Vec3::ZERO;
-    for &j in list {
+    for j in list {
         let other = &input.records[j as usize];
         let d = wrap(model, Vec3::from(other.x) - Vec3::from(own.x));
         let r = d.length();
@@ -232,7 +271,7 @@ fn sum_contacts(
             continue; // farther than a pair parts or meets in half a step
         }
         let v = Vec3::from(other.v) - Vec3::from(own.v);
-        let Some((k, eta)) = constants((other, input.owner[j as usize])) else { continue };
+        let Some((k, eta)) = constants(other, input.owner[j as usize]) else { continue };
         let f = contact::contact_force(d.to_array(), v.to_array(), r, diameter, k, eta, normal_only, input.dt);
         total += Vec3::new(f.x, f.y, f.z);
     }

@@ -6,60 +6,93 @@
 //! relaxation is Jacobi's with Nesterov's momentum, begun anew whenever it runs against the descent. Called by the stages
 //! `divergence` and `pressure`.
 
-use super::lanes::{LANES, Lanes, Linked, Links, gather_one, gather_vectors, sum};
-use super::links::Node;
+use super::lanes::{LANES, Lanes, axes, load, store, vectors};
+use super::links::{Links, Nodes, Table};
 use crate::laws::implicit;
-use fearless_simd::Simd;
-use glam::Vec3;
+use fearless_simd::f32x16;
+use fearless_simd::prelude::*;
 
-/// Accelerations of a chunk of fluid particles (m/s^2) by the shares (Pa) of all; `first` is the chunk's first. `hold` is the part
-/// of gravity that pairs with bodies have, see [`implicit::hold`].
+/// Accelerations of a chunk of fluid particles (m/s^2) by the shares (Pa) of all, which are 0 for particles of bodies; `first` is the
+/// chunk's first. `hold` is the part of gravity that pairs with bodies have, see [`implicit::hold`].
 #[inline(always)]
+#[allow(clippy::too_many_arguments)] // one caller
 pub fn accelerate<S: Simd>(
     simd: S,
+    table: &mut Table,
     links: &Links,
-    nodes: &[Node],
+    nodes: &[Nodes],
     share: &[f32],
     hold: &[f32],
     first: usize,
     out: &mut [[f32; 4]],
 ) {
-    let linked = links.with(share);
-    for (k, (node, out)) in nodes.iter().zip(out).enumerate() {
-        let own = share[first + k];
-        let mut total = [[0.0; LANES]; 3];
-        for (near, e) in linked.fluids(k) {
-            let other = gather_one(near);
-            for l in 0..LANES {
-                let both = own + other[l];
-                total[0][l] += both * f32::from(e[0][l]);
-                total[1][l] += both * f32::from(e[1][l]);
-                total[2][l] += both * f32::from(e[2][l]);
+    let around = table.numbers(links, share);
+    let (share, hold) = (&share[first..first + out.len()], &hold[first..first + out.len()]);
+    let unit = f32x16::splat(simd, links.unit);
+    for (s, nodes) in nodes.iter().enumerate() {
+        let zero = f32x16::splat(simd, 0.0);
+        let mut sum = [zero, zero, zero];
+        for link in links.of(s) {
+            let other = link.numbers(simd, around);
+            let e = link.e(simd);
+            for a in 0..3 {
+                sum[a] += other * e[a];
             }
         }
-        let fluids = links.unit * Vec3::new(sum(simd, &total[0]), sum(simd, &total[1]), sum(simd, &total[2]));
-        let solids = 2.0 * own * node.solid + hold[first + k] * node.pull;
-        let a = -node.inverse_rho * (fluids + solids);
-        *out = [a.x, a.y, a.z, 0.0];
+        let (own, hold) = (load(simd, share, LANES * s), load(simd, hold, LANES * s));
+        let inverse_rho = lanes(simd, &nodes.inverse_rho);
+        for a in 0..3 {
+            let fluids = unit * sum[a] + own * lanes(simd, &nodes.own[a]);
+            sum[a] = zero - inverse_rho * (fluids + hold * lanes(simd, &nodes.pull[a]));
+        }
+        let rows = vectors(simd, sum);
+        let out = out[LANES * s..].as_flattened_mut();
+        for k in 0..rows.len() {
+            if LANES * k < out.len() {
+                store(rows[k], out, LANES * k);
+            }
+        }
     }
 }
 
 /// `sum (u_i - u_j) . e_ij` of a chunk: the rate at which velocities `u` (m/s) compress (1/s), or accelerations alike.
 #[inline(always)]
-pub fn rates<S: Simd>(simd: S, links: &Links, nodes: &[Node], u: &[[f32; 4]], first: usize, out: &mut [f32]) {
-    let linked: Linked<[f32; 4]> = links.with(u);
-    for (k, (node, out)) in nodes.iter().zip(out).enumerate() {
-        let [x, y, z, _] = u[first + k];
-        let mut total: Lanes = [0.0; LANES];
-        for (near, e) in linked.all(k) {
-            let other = gather_vectors(simd, near);
-            for l in 0..LANES {
-                let [x, y, z] = [e[0][l], e[1][l], e[2][l]].map(f32::from);
-                total[l] += other[0][l] * x + other[1][l] * y + other[2][l] * z;
-            }
+pub fn rates<S: Simd>(
+    simd: S,
+    table: &mut Table,
+    links: &Links,
+    nodes: &[Nodes],
+    u: &[[f32; 4]],
+    first: usize,
+    out: &mut [f32],
+) {
+    let around = table.vectors(links, u);
+    let own = u[first..first + out.len()].as_flattened();
+    let unit = f32x16::splat(simd, links.unit);
+    for (s, nodes) in nodes.iter().enumerate() {
+        let mut sum = f32x16::splat(simd, 0.0);
+        for link in links.of(s) {
+            let other = link.vectors(simd, around);
+            let e = link.e(simd);
+            sum += other[0] * e[0] + other[1] * e[1] + other[2] * e[2];
         }
-        *out = node.all.dot(Vec3::new(x, y, z)) - links.unit * sum(simd, &total);
+        let mut rows = [f32x16::splat(simd, 0.0); 4];
+        for k in 0..rows.len() {
+            rows[k] = load(simd, own, own.len().min(4 * LANES * s + LANES * k));
+        }
+        let own = axes(rows);
+        let mut all = f32x16::splat(simd, 0.0);
+        for a in 0..3 {
+            all += lanes(simd, &nodes.all[a]) * own[a];
+        }
+        store(all - unit * sum, out, LANES * s);
     }
+}
+
+/// Sixteen numbers.
+#[inline(always)]
+fn lanes<S: Simd>(simd: S, of: &Lanes) -> f32x16<S> {
+    f32x16::load_array_ref(simd, of)
 }
 
 /// How shares are relaxed in one round.
@@ -99,19 +132,34 @@ pub struct Said {
 /// Relaxes the shares of a chunk. `error` is what is wrong without pressure, `rate` what the shares do about it; `share`
 /// holds the shares that pushed and receives those to push with next, `found` the last round's result and this one's.
 #[inline(always)]
-pub fn relax(round: Round, nodes: &[Node], error: &[f32], rate: &[f32], shares: Shares) -> Said {
-    let mut said = Said::default();
+pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rate: &[f32], shares: Shares) -> Said {
     let Shares { share, hold, found } = shares;
-    for (k, node) in nodes.iter().enumerate() {
-        let left = error[k] + round.scale * rate[k];
-        let before = found[k];
-        let now = implicit::relaxed(share[k], left, round.omega / node.response);
-        // what the share should still change by, in compression: of particles without pressure only the excess counts
-        said.error += f64::from((now - share[k]).abs() * node.response / round.omega);
-        said.against += f64::from((share[k] - now) * (now - before) * node.response);
-        found[k] = now;
-        share[k] = (now + round.momentum * (now - before)).max(0.0);
-        hold[k] = implicit::hold(share[k], round.limit);
+    let mut sums = [[0.0; LANES]; 2];
+    for (s, nodes) in nodes.iter().enumerate() {
+        let at = LANES * s;
+        let read = |from: &[f32]| load(simd, from, at).to_array();
+        let (error, rate, was, before) = (read(error), read(rate), read(share), read(found));
+        let (mut now, mut next, mut held) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (mut change, mut against) = ([0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            let response = nodes.response[l];
+            let left = error[l] + round.scale * rate[l];
+            now[l] = implicit::relaxed(was[l], left, round.omega / response);
+            // what the share should still change by, in compression: of particles without pressure only the excess counts
+            change[l] = (now[l] - was[l]).abs() * response / round.omega;
+            against[l] = (was[l] - now[l]) * (now[l] - before[l]) * response;
+            next[l] = (now[l] + round.momentum * (now[l] - before[l])).max(0.0);
+            held[l] = implicit::hold(next[l], round.limit);
+        }
+        let members = LANES.min(share.len() - at);
+        for l in 0..members {
+            sums[0][l] += f64::from(change[l]);
+            sums[1][l] += f64::from(against[l]);
+        }
+        for (to, from) in [(&mut *found, now), (&mut *share, next), (&mut *hold, held)] {
+            store(f32x16::load_array(simd, from), to, at);
+        }
     }
-    said
+    let [error, against] = sums.map(|lanes| lanes.iter().sum());
+    Said { error, against }
 }

@@ -11,7 +11,7 @@
 use crate::state::Record;
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x4, f32x8, f32x16, u32x16};
+use fearless_simd::{f32x8, f32x16, u32x16};
 
 /// Lanes handled at once.
 pub const LANES: usize = 16;
@@ -141,10 +141,47 @@ pub fn sum<S: Simd>(simd: S, a: &Lanes) -> f32 {
     (v[0] + v[2]) + (v[1] + v[3])
 }
 
+/// Sixteen numbers from `at` on; lanes beyond the end are 0.
+#[inline(always)]
+pub fn load<S: Simd>(simd: S, from: &[f32], at: usize) -> f32x16<S> {
+    let mut part = [0.0; LANES];
+    match from[at..].first_chunk() {
+        Some(full) => return f32x16::load_array_ref(simd, full),
+        None => part.iter_mut().zip(&from[at..]).for_each(|(lane, x)| *lane = *x),
+    }
+    f32x16::load_array(simd, part)
+}
+
+/// Stores sixteen numbers from `at` on; lanes beyond the end are left out.
+#[inline(always)]
+pub fn store<S: Simd>(x: f32x16<S>, to: &mut [f32], at: usize) {
+    match to[at..].first_chunk_mut() {
+        Some(full) => x.store_array(full),
+        None => to[at..].iter_mut().zip(x.to_array()).for_each(|(x, lane)| *x = lane),
+    }
+}
+
+/// Sixteen vectors of four numbers, the first three axis by axis.
+#[inline(always)]
+pub fn axes<S: Simd>([r0, r1, r2, r3]: [f32x16<S>; 4]) -> [f32x16<S>; 3] {
+    let (xz0, y0) = (r0.unzip_low(r1), r0.unzip_high(r1));
+    let (xz1, y1) = (r2.unzip_low(r3), r2.unzip_high(r3));
+    [xz0.unzip_low(xz1), y0.unzip_low(y1), xz0.unzip_high(xz1)]
+}
+
+/// The reverse of [`axes`]: the fourth number is 0.
+#[inline(always)]
+pub fn vectors<S: Simd>(simd: S, [x, y, z]: [f32x16<S>; 3]) -> [f32x16<S>; 4] {
+    let zero = f32x16::splat(simd, 0.0);
+    let (xz0, xz1) = (x.zip_low(z), x.zip_high(z));
+    let (y0, y1) = (y.zip_low(zero), y.zip_high(zero));
+    [xz0.zip_low(y0), xz0.zip_high(y0), xz1.zip_low(y1), xz1.zip_high(y1)]
+}
+
 /// `a - b` lane by lane.
 #[inline(always)]
-pub fn minus<S: Simd>(simd: S, a: &Lanes, b: f32) -> Lanes {
-    (f32x16::load_array_ref(simd, a) - f32x16::splat(simd, b)).to_array()
+pub fn minus<S: Simd>(simd: S, a: &Lanes, b: &Lanes) -> Lanes {
+    (f32x16::load_array_ref(simd, a) - f32x16::load_array_ref(simd, b)).to_array()
 }
 
 /// `x^2 + y^2 + z^2` lane by lane.
@@ -154,172 +191,39 @@ pub fn squares<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> Lanes {
     (x * x + y * y + z * z).to_array()
 }
 
-/// Values of particles, records unless said otherwise, and a list of indices into them, which are checked once for all.
+/// Sixteen neighbours, by their indices.
 #[derive(Clone, Copy)]
-pub struct Listed<'a, T = Record> {
-    values: &'a [T],
-    list: &'a [u32],
-}
-
-/// Sixteen neighbours out of a checked list.
-#[derive(Clone, Copy)]
-pub struct Near<'a, T = Record> {
-    values: &'a [T],
-    /// Their indices.
+pub struct Near<'a> {
+    /// Records of all particles.
+    pub records: &'a [Record],
+    /// Which of them.
     pub index: &'a [u32; LANES],
 }
 
-impl<'a, T> Listed<'a, T> {
-    /// A list of whole vectors.
-    ///
-    /// # Panics
-    /// If an index is not below the number of values: a defect of the search.
-    #[inline(always)]
-    pub fn new<S: Simd>(simd: S, values: &'a [T], list: &'a [u32]) -> Self {
-        let mut largest = u32x16::splat(simd, 0);
-        for block in list.as_chunks().0 {
-            largest = largest.max(u32x16::load_array_ref(simd, block));
-        }
-        let inside = largest.simd_lt(u32x16::splat(simd, values.len() as u32));
-        assert!(list.is_empty() || list.len().is_multiple_of(LANES) && simd.to_bitmask_mask32x16(inside) == 0xffff);
-        Self { values, list }
-    }
-
-    /// Part of the list as it is.
-    #[inline(always)]
-    pub fn indices(self, run: std::ops::Range<usize>) -> &'a [u32] {
-        &self.list[run]
-    }
-
-    /// Part of the list, vector by vector.
-    #[inline(always)]
-    pub fn run(self, run: std::ops::Range<usize>) -> impl Iterator<Item = Near<'a, T>> {
-        self.list[run].as_chunks().0.iter().map(move |index| Near { values: self.values, index })
-    }
-}
-
-/// Sixteen whole numbers of 16 bits each.
-pub type Counts = [i16; LANES];
-
-/// Sixteen neighbours of a particle and a vector to each: 160 bytes.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
-struct Link {
-    index: [u32; LANES],
-    e: [Counts; 3],
-}
-
-/// Neighbours of a chunk of particles with a vector to each, kept while a solver iterates: one stream to read, which rounds wait for. So
-/// the vectors are whole numbers of `unit`, the same for all particles, that those of both sides of a pair stay opposite.
-#[derive(Clone, Debug, Default)]
-pub struct Links {
-    /// What a component of a vector counts (1/m).
-    pub unit: f32,
-    blocks: Vec<Link>,
-    used: usize,
-    /// Begin of a particle's blocks, end of those of fluids, end of all.
-    spans: Vec<[u32; 3]>,
-    largest: [u32; LANES],
-}
-
-impl Links {
-    /// Forgets everything, and makes room for the links of a list so long, with vectors whose components are no larger than `largest`.
-    #[inline(always)]
-    pub fn clear(&mut self, list: usize, largest: f32) {
-        if self.blocks.len() < list / LANES {
-            self.blocks.resize(list / LANES, Link { index: [0; LANES], e: [[0; LANES]; 3] });
-        }
-        self.unit = largest / f32::from(i16::MAX);
-        self.used = 0;
-        self.spans.clear();
-        self.largest = [0; LANES];
-    }
-
-    /// Begins the next particle.
-    #[inline(always)]
-    pub fn begin(&mut self) {
-        self.spans.push([self.used as u32; 3]);
-    }
-
-    /// Ends the particle's fluids.
-    #[inline(always)]
-    pub fn end_fluids(&mut self) {
-        if let Some(span) = self.spans.last_mut() {
-            *span = [span[0], self.used as u32, self.used as u32];
-        }
-    }
-
-    /// Ends the particle's neighbours.
-    #[inline(always)]
-    pub fn end(&mut self) {
-        if let Some(span) = self.spans.last_mut() {
-            span[2] = self.used as u32;
-        }
-    }
-
-    /// Adds sixteen neighbours of the particle begun last.
-    #[inline(always)]
-    pub fn push<S: Simd>(&mut self, simd: S, index: &[u32; LANES], e: &[Counts; 3]) {
-        self.largest = u32x16::load_array_ref(simd, &self.largest).max(u32x16::load_array_ref(simd, index)).to_array();
-        self.blocks[self.used] = Link { index: *index, e: *e };
-        self.used += 1;
-    }
-
-    /// The links together with values of all particles.
-    ///
-    /// # Panics
-    /// If a neighbour has no value: a defect of the search.
-    #[inline(always)]
-    pub fn with<'a, T>(&'a self, values: &'a [T]) -> Linked<'a, T> {
-        assert!(self.largest.iter().all(|&l| (l as usize) < values.len().max(1)));
-        assert!(self.used == 0 || !values.is_empty());
-        Linked { links: self, values }
-    }
-}
-
-/// Links and values of the neighbours, which are checked to be there.
-#[derive(Clone, Copy)]
-pub struct Linked<'a, T> {
-    links: &'a Links,
-    values: &'a [T],
-}
-
-impl<'a, T> Linked<'a, T> {
-    /// The fluids linked to particle `k` of the chunk, and the vectors to them.
-    #[inline(always)]
-    pub fn fluids(self, k: usize) -> impl Iterator<Item = (Near<'a, T>, &'a [Counts; 3])> {
-        let [begin, end, _] = self.links.spans[k];
-        self.blocks(begin, end)
-    }
-
-    /// All that are linked to particle `k` of the chunk.
-    #[inline(always)]
-    pub fn all(self, k: usize) -> impl Iterator<Item = (Near<'a, T>, &'a [Counts; 3])> {
-        let [begin, _, end] = self.links.spans[k];
-        self.blocks(begin, end)
-    }
-
-    #[inline(always)]
-    fn blocks(self, begin: u32, end: u32) -> impl Iterator<Item = (Near<'a, T>, &'a [Counts; 3])> {
-        let blocks = &self.links.blocks[begin as usize..end as usize];
-        blocks.iter().map(move |b| (Near { values: self.values, index: &b.index }, &b.e))
-    }
-}
-
-/// Added to a number, leaves its nearest whole number in the last bits.
-const ROUND: f32 = 12_582_912.0;
-
-/// How often `unit` (given by its inverse) goes into sixteen numbers, and what that many are.
+/// A list of neighbours in whole vectors, one vector after another.
 #[inline(always)]
-pub fn counted(x: &mut Lanes, unit: f32, inverse: f32) -> Counts {
-    let mut counts = [0; LANES];
-    let most = f32::from(i16::MAX);
-    for l in 0..LANES {
-        let shifted = (x[l] * inverse).clamp(-most, most) + ROUND;
-        counts[l] = shifted.to_bits() as i16;
-        x[l] = unit * (shifted - ROUND);
+pub fn listed<'a>(records: &'a [Record], list: &'a [u32]) -> impl Iterator<Item = Near<'a>> {
+    list.as_chunks().0.iter().map(move |index| Near { records, index })
+}
+
+/// Transposes sixteen rows of sixteen numbers: four perfect shuffles of the upper eight rows into the lower.
+#[inline(always)]
+pub fn transpose<S: Simd>(simd: S, rows: &mut [Indices; LANES]) {
+    let mut from = [u32x16::splat(simd, 0); LANES];
+    for k in 0..LANES {
+        from[k] = u32x16::load_array_ref(simd, &rows[k].0);
     }
-    counts
+    for _ in 0..4 {
+        let mut to = from;
+        for k in 0..LANES / 2 {
+            to[2 * k] = from[k].zip_low(from[k + LANES / 2]);
+            to[2 * k + 1] = from[k].zip_high(from[k + LANES / 2]);
+        }
+        from = to;
+    }
+    for k in 0..LANES {
+        from[k].store_array(&mut rows[k].0);
+    }
 }
 
 /// Sixteen records side by side.
@@ -335,8 +239,13 @@ pub struct Transposed {
 }
 
 /// Loads sixteen records: 16 whole-record loads and three rounds of unzipping.
+///
+/// # Panics
+/// If there are not so many records: a defect of the search.
 #[inline(always)]
 pub fn gather<S: Simd>(simd: S, near: Near) -> Transposed {
+    let inside = u32x16::load_array_ref(simd, near.index).simd_lt(u32x16::splat(simd, near.records.len() as u32));
+    assert!(simd.to_bitmask_mask32x16(inside) == 0xffff);
     let r = [
         pair(simd, near, 0),
         pair(simd, near, 2),
@@ -374,39 +283,9 @@ fn pair<S: Simd>(simd: S, near: Near, k: usize) -> f32x16<S> {
 
 #[inline(always)]
 fn row<S: Simd>(simd: S, near: Near, k: usize) -> f32x8<S> {
-    // SAFETY: `Listed::new` has compared the indices with the number of these very records
-    let record = unsafe { near.values.get_unchecked(near.index[k] as usize) };
+    // SAFETY: `gather`, the only caller, has compared the indices with the number of records
+    let record = unsafe { near.records.get_unchecked(near.index[k] as usize) };
     f32x8::load_array_ref(simd, bytemuck::cast_ref::<Record, [f32; 8]>(record))
-}
-
-/// Loads sixteen numbers.
-#[inline(always)]
-pub fn gather_one(near: Near<f32>) -> Lanes {
-    let mut out = [0.0; LANES];
-    for l in 0..LANES {
-        // SAFETY: `Listed::new` or `Links::with` has compared the indices with the number of these very values
-        out[l] = unsafe { *near.values.get_unchecked(near.index[l] as usize) };
-    }
-    out
-}
-
-/// Loads sixteen vectors, whose fourth number is left out.
-#[inline(always)]
-pub fn gather_vectors<S: Simd>(simd: S, near: Near<[f32; 4]>) -> [Lanes; 3] {
-    let r = [four(simd, near, 0), four(simd, near, 4), four(simd, near, 8), four(simd, near, 12)];
-    let (a0, b0) = unzip(r[0], r[1]);
-    let (a1, b1) = unzip(r[2], r[3]);
-    let (x, z) = unzip(a0, a1);
-    [x.to_array(), b0.unzip_low(b1).to_array(), z.to_array()]
-}
-
-/// Four vectors of four numbers in one.
-#[inline(always)]
-fn four<S: Simd>(simd: S, near: Near<[f32; 4]>, k: usize) -> f32x16<S> {
-    // SAFETY: as above
-    let row = |k: usize| unsafe { near.values.get_unchecked(near.index[k] as usize) };
-    let pair = |k: usize| f32x4::load_array_ref(simd, row(k)).combine(f32x4::load_array_ref(simd, row(k + 1)));
-    pair(k).combine(pair(k + 2))
 }
 
 /// Even and odd elements of two vectors on end.
@@ -421,30 +300,13 @@ mod tests {
     use fearless_simd::{Level, dispatch};
 
     #[test]
-    fn counts_of_opposite_numbers_are_opposite() {
-        let unit = 0.013;
-        let numbers: Lanes = std::array::from_fn(|l| (l as f32 - 6.5) * 61.7);
-        let (mut plus, mut minus) = (numbers, numbers.map(|x| -x));
-        let (up, down) = (counted(&mut plus, unit, 1.0 / unit), counted(&mut minus, unit, 1.0 / unit));
-        for l in 0..LANES {
-            assert_eq!(up[l], -down[l]);
-            assert_eq!(plus[l], -minus[l]);
-            let most = f32::from(i16::MAX) * unit;
-            let exact = numbers[l].clamp(-most, most);
-            assert!((plus[l] - exact).abs() <= 0.5001 * unit, "{exact} became {}", plus[l]);
-            assert_eq!(plus[l], unit * f32::from(up[l]));
-        }
-    }
-
-    #[test]
     fn gather_transposes() {
         let records: Vec<Record> = (0..40)
             .map(|i| bytemuck::cast::<[f32; 8], Record>(std::array::from_fn(|c| (100 * i + c) as f32)))
             .collect();
         let list: [u32; LANES] = std::array::from_fn(|l| (l * 7 % 40) as u32);
         let t = dispatch!(Level::new(), simd => {
-            let listed = Listed::new(simd, &records, &list);
-            gather(simd, listed.run(0..LANES).next().unwrap())
+            gather(simd, Near { records: &records, index: &list })
         });
         for (l, &j) in list.iter().enumerate() {
             let r = records[j as usize];
@@ -452,5 +314,51 @@ mod tests {
             assert_eq!([t.v[0][l], t.v[1][l], t.v[2][l]], r.v);
             assert_eq!((t.volume[l], t.share[l]), (r.volume, r.share));
         }
+    }
+
+    #[test]
+    fn rows_become_columns() {
+        let mut rows: [Indices; LANES] =
+            std::array::from_fn(|r| Indices(std::array::from_fn(|c| (100 * r + c) as u32)));
+        dispatch!(Level::new(), simd => transpose(simd, &mut rows));
+        for r in 0..LANES {
+            for c in 0..LANES {
+                assert_eq!(rows[r].0[c], (100 * c + r) as u32);
+            }
+        }
+    }
+
+    #[test]
+    #[should_panic]
+    fn nothing_is_read_beyond_the_records() {
+        let records = [Record::default(); 20];
+        let mut list = [3; LANES];
+        list[11] = 20;
+        dispatch!(Level::new(), simd => gather(simd, Near { records: &records, index: &list }));
+    }
+
+    #[test]
+    fn vectors_and_axes_are_each_others_reverse() {
+        let x: [Lanes; 3] = std::array::from_fn(|a| std::array::from_fn(|l| (100 * a + l) as f32));
+        dispatch!(Level::new(), simd => {
+            let rows = vectors(simd, x.map(|c| f32x16::load_array(simd, c)));
+            for l in 0..LANES {
+                assert_eq!(rows[l / 4].to_array()[4 * (l % 4)..][..4], [x[0][l], x[1][l], x[2][l], 0.0]);
+            }
+            assert_eq!(axes(rows).map(|c| c.to_array()), x);
+        });
+    }
+
+    #[test]
+    fn what_is_beyond_the_end_is_zero_and_stays() {
+        let numbers: Vec<f32> = (1..=20).map(|i| i as f32).collect();
+        let mut out = vec![0.0; 20];
+        dispatch!(Level::new(), simd => {
+            for at in [0, 16] {
+                store(load(simd, &numbers, at), &mut out, at);
+            }
+            assert_eq!(load(simd, &numbers, 16).to_array()[3..6], [20.0, 0.0, 0.0]);
+        });
+        assert_eq!(out, numbers);
     }
 }

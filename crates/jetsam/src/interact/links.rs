@@ -1,35 +1,202 @@
 //! What implicit solvers (E9) know of the neighbourhood of each fluid particle while they iterate.
 //!
-//! In: neighbour runs, records. Out: [`Links`], the vectors `e_ij = V_j grad_i W_ij` to fluids and particles of bodies; a
-//! [`Node`] for each particle, with the sums of these vectors; for PBF, whose particles move while it iterates, densities anew.
+//! In: transposed neighbours, records. Out: [`Links`], the vectors `e_ij = V_j grad_i W_ij` to fluids and particles of bodies; a
+//! [`Nodes`] for sixteen particles, with the sums of these vectors; for PBF, whose particles move while it iterates, densities anew.
 //! Walls do not answer: they are in the sums alone. Called by the stages `divergence` and `pressure`.
+//!
+//! Rounds wait for the links they read, and for the values of neighbours. So a link takes 8 bytes: its vector in whole numbers, and
+//! where the neighbour stands among the values around the chunk, which a [`Table`] holds together.
 
 use super::boundary::acceleration;
 use super::density::weights;
-use super::lanes::{LANES, Lanes, Links, Listed, Near, counted, gather, sum};
-use super::neighbours::{NeighbourChunk, Runs};
+use super::lanes::{LANES, Lanes, Near, axes, gather, listed, sum};
+use super::neighbours::NeighbourChunk;
 use super::pairs::wrap_lanes;
+use super::slices::{Own, Slices, splat};
 use crate::laws::implicit;
 use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
 use crate::scene::Coupling;
 use crate::state::{Body, Kind, Record};
-use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x4, f32x16, i32x16};
 use glam::Vec3;
 
-/// Sums over the neighbours of one fluid particle.
+/// A neighbour of each of sixteen fluid particles: 128 bytes.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Node {
+#[repr(C, align(64))]
+pub struct Link {
+    /// `x` in the lower and `y` in the upper half, whole numbers of [`Links::unit`].
+    xy: [i32; LANES],
+    /// `z` in the upper half; in the lower the place of the neighbour in the table around the chunk.
+    z_to: [i32; LANES],
+}
+
+impl Link {
+    /// The vectors, in [`Links::unit`].
+    #[inline(always)]
+    pub fn e<S: Simd>(&self, simd: S) -> [f32x16<S>; 3] {
+        let (xy, z) = (i32x16::load_array_ref(simd, &self.xy), i32x16::load_array_ref(simd, &self.z_to));
+        [((xy << 16) >> 16).to_float(), (xy >> 16).to_float(), (z >> 16).to_float()]
+    }
+
+    /// Place of the neighbour of lane `l`.
+    #[inline(always)]
+    fn to(&self, l: usize) -> usize {
+        (self.z_to[l] & 0xffff) as usize
+    }
+
+    /// Numbers of the neighbours.
+    #[inline(always)]
+    pub fn numbers<S: Simd>(&self, simd: S, table: &[f32; PLACES]) -> f32x16<S> {
+        let four = |k: usize| {
+            f32x4::load_array(
+                simd,
+                [table[self.to(k)], table[self.to(k + 1)], table[self.to(k + 2)], table[self.to(k + 3)]],
+            )
+        };
+        four(0).combine(four(4)).combine(four(8).combine(four(12)))
+    }
+
+    /// Vectors of the neighbours, axis by axis.
+    #[inline(always)]
+    pub fn vectors<S: Simd>(&self, simd: S, table: &[[f32; 4]; PLACES]) -> [f32x16<S>; 3] {
+        let row = |k: usize| f32x4::load_array_ref(simd, &table[self.to(k)]);
+        let four = |k: usize| row(k).combine(row(k + 1)).combine(row(k + 2).combine(row(k + 3)));
+        axes([four(0), four(4), four(8), four(12)])
+    }
+}
+
+/// Links of a chunk of fluid particles, kept while a solver iterates. Their vectors are whole numbers of `unit`, the same for all
+/// particles, that those of both sides of a pair stay opposite.
+#[derive(Clone, Debug, Default)]
+pub struct Links {
+    /// What a component of a vector counts (1/m).
+    pub unit: f32,
+    links: Vec<Link>,
+    used: usize,
+    /// End of the links of each slice.
+    ends: Vec<u32>,
+    /// Runs of particles that the links lead to, `[begin, end]`, and what to take from an index to find its place.
+    halo: Vec<[u32; 3]>,
+}
+
+/// How many places a table has. Around a chunk of 512 particles there are some 3,000 others; of more than this, hundreds of times what rest
+/// would hold, the rest are taken for the last.
+pub const PLACES: usize = 1 << 16;
+
+/// Values of the particles around a chunk, those of a run one after another: scratch of a thread.
+#[derive(Default)]
+pub struct Table {
+    numbers: Vec<f32>,
+    vectors: Vec<[f32; 4]>,
+}
+
+impl Table {
+    /// Numbers around a chunk.
+    #[inline(always)]
+    pub fn numbers(&mut self, links: &Links, of: &[f32]) -> &[f32; PLACES] {
+        links.collect(of, &mut self.numbers)
+    }
+
+    /// Vectors around a chunk.
+    #[inline(always)]
+    pub fn vectors(&mut self, links: &Links, of: &[[f32; 4]]) -> &[[f32; 4]; PLACES] {
+        links.collect(of, &mut self.vectors)
+    }
+}
+
+impl Links {
+    /// Forgets everything, and makes room for the links of a chunk, with vectors whose components are no larger than `largest`.
+    #[inline(always)]
+    fn clear(&mut self, slices: &Slices, largest: f32) {
+        if self.links.len() < slices.room() {
+            self.links.resize(slices.room(), Link::default());
+        }
+        self.unit = largest / f32::from(i16::MAX);
+        self.used = 0;
+        self.ends.clear();
+        self.halo.clear();
+        let mut places = 0;
+        for &[begin, end] in slices.halo() {
+            self.halo.push([begin, end, begin.wrapping_sub(places)]);
+            places += end - begin;
+        }
+    }
+
+    /// Adds a neighbour to each of sixteen particles, and rounds the vectors to what is kept of them.
+    #[inline(always)]
+    fn push(&mut self, index: &[u32; LANES], e: &mut [Lanes; 3]) {
+        let mut offset = [self.halo.first().map_or(0, |run| run[2]); LANES];
+        for &[begin, _, by] in self.halo.iter().skip(1) {
+            for l in 0..LANES {
+                offset[l] = if index[l] >= begin { by } else { offset[l] };
+            }
+        }
+        let [x, y, z] = e;
+        let inverse = 1.0 / self.unit;
+        let (x, y, z) =
+            (counted(x, self.unit, inverse), counted(y, self.unit, inverse), counted(z, self.unit, inverse));
+        let link = &mut self.links[self.used];
+        for l in 0..LANES {
+            let to = index[l].wrapping_sub(offset[l]).min(PLACES as u32 - 1);
+            link.xy[l] = (x[l] & 0xffff | y[l] << 16) as i32;
+            link.z_to[l] = (z[l] << 16 | to) as i32;
+        }
+        self.used += 1;
+    }
+
+    /// The links of slice `s`, slot by slot.
+    #[inline(always)]
+    pub fn of(&self, s: usize) -> &[Link] {
+        let begin = if s == 0 { 0 } else { self.ends[s - 1] };
+        &self.links[begin as usize..self.ends[s] as usize]
+    }
+
+    /// Brings the values around the chunk together.
+    #[inline(always)]
+    fn collect<'t, T: Copy + Default>(&self, of: &[T], table: &'t mut Vec<T>) -> &'t [T; PLACES] {
+        table.resize(PLACES, T::default());
+        let mut at = 0;
+        for &[begin, end, _] in &self.halo {
+            let run = &of[begin as usize..end as usize];
+            let fits = run.len().min(PLACES - at);
+            table[at..at + fits].copy_from_slice(&run[..fits]);
+            at += fits;
+        }
+        table.first_chunk().expect("resized above")
+    }
+}
+
+/// Added to a number, leaves its nearest whole number in the last bits.
+const ROUND: f32 = 12_582_912.0;
+
+/// How often `unit` (given by its inverse) goes into sixteen numbers, in the lower 16 bits, and what that many are.
+#[inline(always)]
+fn counted(x: &mut Lanes, unit: f32, inverse: f32) -> [u32; LANES] {
+    let mut counts = [0; LANES];
+    let most = f32::from(i16::MAX);
+    for l in 0..LANES {
+        let shifted = (x[l] * inverse).clamp(-most, most) + ROUND;
+        counts[l] = shifted.to_bits();
+        x[l] = unit * (shifted - ROUND);
+    }
+    counts
+}
+
+/// Sums over the neighbours of sixteen fluid particles.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Nodes {
     /// `sum e_ij` over all neighbours (1/m).
-    pub all: Vec3,
-    /// `sum e_ib` over particles of bodies and walls (1/m).
-    pub solid: Vec3,
-    /// `sum rho_i (g - a_b) . d_ib e_ib`, alike (Pa/m).
-    pub pull: Vec3,
+    pub all: [Lanes; 3],
+    /// `sum e_ij` once more over particles of bodies and walls, whose share is the particle's own (1/m).
+    pub own: [Lanes; 3],
+    /// `sum rho_i (g - a_b) . d_ib e_ib` over particles of bodies and walls (Pa/m).
+    pub pull: [Lanes; 3],
     /// `1 / rho_0` (m^3/kg).
-    pub inverse_rho: f32,
+    pub inverse_rho: Lanes,
     /// How fast the particle's density is driven down by its own share (1/(Pa s^2)).
-    pub response: f32,
+    pub response: Lanes,
 }
 
 /// What is read.
@@ -47,51 +214,64 @@ pub struct Input<'a> {
     pub gravity: Vec3,
 }
 
-/// What one run of neighbours adds.
-#[derive(Clone, Copy, Default)]
-struct Part {
-    e: Vec3,
-    pull: Vec3,
-    pairs: f32,
-    weight: f32,
+/// What sixteen particles sum.
+#[derive(Default)]
+struct Sums {
+    fluid: [Lanes; 3],
+    solid: [Lanes; 3],
+    pull: [Lanes; 3],
+    pairs: Lanes,
+    weight: Lanes,
 }
 
-/// Links and nodes of a chunk of fluid particles; `first` is the chunk's first. With `DENSITY` their densities too.
+/// Links and nodes of a chunk of fluid particles. With `DENSITY` their densities too.
 #[inline(always)]
 pub fn chunk<S: Simd, const DENSITY: bool>(
     simd: S,
     input: Input,
-    first: usize,
-    chunk: &NeighbourChunk,
+    slices: &Slices,
     links: &mut Links,
-    nodes: &mut [Node],
+    nodes: &mut [Nodes],
     density: &mut [f32],
 ) {
     let model = input.model;
-    let listed = Listed::new(simd, input.records, chunk.list());
     let floor = 1e-4 / (model.spacing * model.spacing) as f32;
-    links.clear(chunk.list().len(), model.longest_link());
-    for (k, (runs, node)) in chunk.runs.iter().zip(nodes).enumerate() {
-        links.begin();
-        let fluid = run::<S, DENSITY, true>(simd, &input, listed, first + k, runs, Kind::Fluid, links);
-        links.end_fluids();
-        let mut solid = Part::default();
-        for &kind in bodies(model) {
-            if runs.count(kind) > 0 {
-                let part = run::<S, DENSITY, false>(simd, &input, listed, first + k, runs, kind, links);
-                solid.e += part.e;
-                solid.pull += part.pull;
-                solid.weight += part.weight;
+    let at_center = model.kernel.density().w(0.0);
+    links.clear(slices, model.longest_link());
+    for ((s, members), nodes) in slices.each().zip(nodes) {
+        let own = Own::slice(simd, input.records, slices, s);
+        let mut rho = [model.fluids[0].density; LANES];
+        if model.fluids.len() > 1 {
+            for l in 0..LANES {
+                rho[l] = model.fluids[input.owner[own.i[l] as usize] as usize].density;
             }
         }
-        links.end();
-        let inverse_rho = 1.0 / model.fluids[input.owner[first + k] as usize].density;
-        let all = fluid.e + solid.e;
-        let own = (all + solid.e).dot(all);
-        let response = implicit::response(own, all.length_squared(), inverse_rho, fluid.pairs);
-        *node = Node { all, solid: solid.e, pull: solid.pull, inverse_rho, response: response + floor * inverse_rho };
+        let mut sums = Sums::default();
+        run::<S, DENSITY, true>(simd, &input, slices, s, &own, &rho, Kind::Fluid, links, &mut sums);
+        for &kind in bodies(model) {
+            if slices.has(s, kind) {
+                run::<S, DENSITY, false>(simd, &input, slices, s, &own, &rho, kind, links, &mut sums);
+            }
+        }
+        links.ends.push(links.used as u32);
+        for l in 0..LANES {
+            let inverse_rho = 1.0 / rho[l];
+            let (mut own_dot_all, mut all_sq) = (0.0, 0.0);
+            for a in 0..3 {
+                let all = sums.fluid[a][l] + sums.solid[a][l];
+                let own = all + sums.solid[a][l];
+                own_dot_all += own * all;
+                all_sq += all * all;
+                (nodes.all[a][l], nodes.own[a][l]) = (all, own);
+            }
+            let response = implicit::response(own_dot_all, all_sq, inverse_rho, sums.pairs[l]);
+            (nodes.inverse_rho[l], nodes.response[l]) = (inverse_rho, response + floor * inverse_rho);
+        }
+        nodes.pull = sums.pull;
         if DENSITY {
-            density[k] = model.factors.w * (fluid.weight + solid.weight);
+            for (l, k) in members.enumerate() {
+                density[k] = model.factors.w * (sums.weight[l] + at_center * own.at.volume[l]);
+            }
         }
     }
 }
@@ -106,26 +286,27 @@ pub fn bodies(model: &Model) -> &'static [Kind] {
 
 /// Links to the neighbours of one kind, and their sums.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)] // one caller
 fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
     simd: S,
     input: &Input,
-    listed: Listed,
-    i: usize,
-    runs: &Runs,
+    slices: &Slices,
+    s: usize,
+    own: &Own,
+    rho: &Lanes,
     kind: Kind,
     links: &mut Links,
-) -> Part {
-    let Input { model, records, owner, .. } = *input;
-    let own = &records[i];
-    let rho = model.fluids[owner[i] as usize].density;
+    sums: &mut Sums,
+) {
+    let Input { model, records, owner, gravity, .. } = *input;
     let (inverse, factor) = (model.inverse_support(), model.factors.g);
-    let pull = rho * input.gravity;
-    let (unit, per_unit) = (links.unit, 1.0 / links.unit);
-    let mut sums = Sums::default();
-    let mut answer = [1.0 / rho; LANES];
-    for near in listed.run(runs.padded(kind)) {
+    let mut answer = [0.0; LANES];
+    for l in 0..LANES {
+        answer[l] = 1.0 / rho[l];
+    }
+    for near in slices.run(records, s, kind) {
         let other = gather(simd, near);
-        let (d, r_sq) = wrap_lanes(simd, model, own.x, &other.x);
+        let (d, r_sq) = wrap_lanes(simd, model, &own.at.x, &other.x);
         if FLUID && model.fluids.len() > 1 {
             for l in 0..LANES {
                 answer[l] = 1.0 / model.fluids[owner[near.index[l] as usize] as usize].density;
@@ -133,57 +314,39 @@ fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
         }
         let mut e = each_kernel!(model.kernel.force(), K => sixteen(K, factor, inverse, &d, &r_sq, &other.volume));
         if kind != Kind::Static {
-            let [x, y, z] = &mut e;
-            let counts = [counted(x, unit, per_unit), counted(y, unit, per_unit), counted(z, unit, per_unit)];
-            links.push(simd, near.index, &counts);
+            links.push(near.index, &mut e);
         }
+        let sum = if FLUID { &mut sums.fluid } else { &mut sums.solid };
         for l in 0..LANES {
-            sums.e[0][l] += e[0][l];
-            sums.e[1][l] += e[1][l];
-            sums.e[2][l] += e[2][l];
-            sums.pairs[l] += answer[l] * (e[0][l] * e[0][l] + e[1][l] * e[1][l] + e[2][l] * e[2][l]);
+            sum[0][l] += e[0][l];
+            sum[1][l] += e[1][l];
+            sum[2][l] += e[2][l];
+        }
+        if FLUID {
+            for l in 0..LANES {
+                sums.pairs[l] += answer[l] * (e[0][l] * e[0][l] + e[1][l] * e[1][l] + e[2][l] * e[2][l]);
+            }
         }
         if !FLUID {
             for l in 0..LANES {
-                let pull = pull.x * d[0][l] + pull.y * d[1][l] + pull.z * d[2][l];
+                let pull = rho[l] * (gravity.x * d[0][l] + gravity.y * d[1][l] + gravity.z * d[2][l]);
                 sums.pull[0][l] += pull * e[0][l];
                 sums.pull[1][l] += pull * e[1][l];
                 sums.pull[2][l] += pull * e[2][l];
             }
         }
         if kind == Kind::Rigid {
-            scripted(input, near, &d, &e, rho, &mut sums);
+            scripted(input, near, &d, &e, rho, sums);
         }
         if DENSITY {
             let w = weights(model.kernel.density(), inverse, &r_sq);
             for l in 0..LANES {
-                sums.weight[l] += other.volume[l] * w[l];
+                // the particle itself, and what fills a slot, is left to the end
+                let weight = if near.index[l] == own.i[l] { 0.0 } else { w[l] };
+                sums.weight[l] += other.volume[l] * weight;
             }
         }
     }
-    // padding is the particle itself: e is zero, W is not
-    let padding = (runs.padded(kind).len() - runs.count(kind)) as f32;
-    let at_center = if DENSITY { model.kernel.density().w(0.0) * own.volume } else { 0.0 };
-    Part {
-        e: total(simd, &sums.e),
-        pull: if FLUID { Vec3::ZERO } else { total(simd, &sums.pull) },
-        pairs: sum(simd, &sums.pairs),
-        weight: if DENSITY { sum(simd, &sums.weight) - padding * at_center } else { 0.0 },
-    }
-}
-
-/// Sums of the lanes of a vector.
-#[inline(always)]
-fn total<S: Simd>(simd: S, of: &[Lanes; 3]) -> Vec3 {
-    Vec3::new(sum(simd, &of[0]), sum(simd, &of[1]), sum(simd, &of[2]))
-}
-
-#[derive(Default)]
-struct Sums {
-    e: [Lanes; 3],
-    pull: [Lanes; 3],
-    pairs: Lanes,
-    weight: Lanes,
 }
 
 /// The vectors to sixteen neighbours, in one loop over the lanes.
@@ -201,11 +364,11 @@ fn sixteen(kernel: Kernel, factor: f32, inverse: f32, d: &[Lanes; 3], r_sq: &Lan
 
 /// The part of `pull` that the accelerations of scripted bodies have.
 #[inline(always)]
-fn scripted(input: &Input, near: Near, d: &[Lanes; 3], e: &[Lanes; 3], rho: f32, sums: &mut Sums) {
+fn scripted(input: &Input, near: Near, d: &[Lanes; 3], e: &[Lanes; 3], rho: &Lanes, sums: &mut Sums) {
     for l in 0..LANES {
         let j = near.index[l] as usize;
         let Some(body) = input.bodies.get(input.owner[j] as usize).filter(|b| b.is_static()) else { continue };
-        let a = rho * acceleration(body, &input.records[j]);
+        let a = rho[l] * acceleration(body, &input.records[j]);
         let pull = a.x * d[0][l] + a.y * d[1][l] + a.z * d[2][l];
         for axis in 0..3 {
             sums.pull[axis][l] -= pull * e[axis][l];
@@ -227,7 +390,6 @@ pub fn press<S: Simd>(
 ) {
     let Input { model, records, owner, bodies, gravity } = input;
     let (inverse, factor) = (model.inverse_support(), model.factors.g);
-    let listed = Listed::new(simd, records, chunk.list());
     for (k, (runs, force)) in chunk.runs.iter().zip(force).enumerate() {
         *force = [0.0; 3];
         if runs.count(Kind::Fluid) == 0 {
@@ -237,9 +399,10 @@ pub fn press<S: Simd>(
         let body = &bodies[owner[first + k] as usize];
         let a = if body.is_static() { acceleration(body, own) } else { Vec3::ZERO };
         let mut total = [[0.0; LANES]; 3];
-        for near in listed.run(runs.padded(Kind::Fluid)) {
+        let x = splat(own.x);
+        for near in listed(records, &chunk.list()[runs.padded(Kind::Fluid)]) {
             let other = gather(simd, near);
-            let (d, r_sq) = wrap_lanes(simd, model, own.x, &other.x);
+            let (d, r_sq) = wrap_lanes(simd, model, &x, &other.x);
             let mut rho = [model.fluids[0].density; LANES];
             if model.fluids.len() > 1 {
                 for l in 0..LANES {
@@ -267,6 +430,53 @@ pub fn press<S: Simd>(
                 total[2][l] += along_d * d[2][l];
             });
         }
-        *force = self::total(simd, &total).to_array();
+        *force = [sum(simd, &total[0]), sum(simd, &total[1]), sum(simd, &total[2])];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::{Level, dispatch};
+
+    #[test]
+    fn counts_of_opposite_numbers_are_opposite() {
+        let unit = 0.013;
+        let numbers: Lanes = std::array::from_fn(|l| (l as f32 - 6.5) * 61.7);
+        let (mut plus, mut minus) = (numbers, numbers.map(|x| -x));
+        let (up, down) = (counted(&mut plus, unit, 1.0 / unit), counted(&mut minus, unit, 1.0 / unit));
+        let (up, down) = (up.map(|c| c as i16), down.map(|c| c as i16));
+        for l in 0..LANES {
+            assert_eq!(up[l], -down[l]);
+            assert_eq!(plus[l], -minus[l]);
+            let most = f32::from(i16::MAX) * unit;
+            let exact = numbers[l].clamp(-most, most);
+            assert!((plus[l] - exact).abs() <= 0.5001 * unit, "{exact} became {}", plus[l]);
+            assert_eq!(plus[l], unit * f32::from(up[l]));
+        }
+    }
+
+    /// What is linked is found again: vectors as they were rounded, values of the neighbours named.
+    #[test]
+    fn links_lead_to_the_neighbours() {
+        let halo = vec![[40, 90, 40], [200, 230, 150], [1000, 1100, 920]];
+        let mut links = Links { unit: 0.5, links: vec![Link::default()], used: 0, ends: vec![1], halo: halo.clone() };
+        let index: [u32; LANES] = std::array::from_fn(|l| [45, 89, 200, 229, 1000, 1099][l % 6]);
+        let mut e: [Lanes; 3] = std::array::from_fn(|a| std::array::from_fn(|l| (l as f32 - 7.3) * (a as f32 - 0.9)));
+        links.push(&index, &mut e);
+        let values: Vec<f32> = (0..2000).map(|i| i as f32).collect();
+        let mut table = Table::default();
+        let vectors: Vec<[f32; 4]> = values.iter().map(|i| [*i, 2.0 * i, 3.0 * i, 0.0]).collect();
+        let link = links.of(0)[0];
+        dispatch!(Level::new(), simd => {
+            let one = link.numbers(simd, table.numbers(&links, &values)).to_array();
+            let [x, y, z] = link.vectors(simd, table.vectors(&links, &vectors)).map(|c| c.to_array());
+            let [e_x, e_y, e_z] = link.e(simd).map(|c| c.to_array());
+            for l in 0..LANES {
+                let i = index[l] as f32;
+                assert_eq!([one[l], x[l], y[l], z[l]], [i, i, 2.0 * i, 3.0 * i]);
+                assert_eq!([e_x[l], e_y[l], e_z[l]].map(|c| 0.5 * c), [e[0][l], e[1][l], e[2][l]]);
+            }
+        });
     }
 }

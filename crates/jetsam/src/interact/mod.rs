@@ -14,6 +14,7 @@ pub mod links;
 pub mod neighbours;
 pub mod pairs;
 pub mod pressure;
+pub mod slices;
 
 /// Particles handled as one parallel task. Fixed: sums over tasks are added in task order, so that no result
 /// depends on the number of threads.

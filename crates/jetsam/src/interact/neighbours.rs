@@ -58,6 +58,8 @@ pub struct NeighbourChunk {
     pub runs: Vec<Runs>,
     /// Whether any particle of the chunk has neighbours: most of a wall is far from everything.
     pub found: bool,
+    /// Of a chunk of fluid: runs of particles, `[begin, end]` (the end is not in it), that were searched for fluids and rigid bodies.
+    pub among: Vec<[u32; 2]>,
 }
 
 /// Positions in the order of the sort, axis by axis, so that runs of cells are packed by whole vectors. Written by
@@ -89,6 +91,10 @@ struct Tile {
 pub struct Scratch {
     tile: [Tile; Kind::COUNT],
     r_sq: Vec<Block>,
+    /// Neighbours of a chunk of fluid, until they are transposed.
+    pub rows: NeighbourChunk,
+    /// Numbers around a chunk, see [`super::links::Links`].
+    pub places: super::links::Table,
 }
 
 thread_local! {
@@ -158,6 +164,7 @@ impl NeighbourChunk {
         mut each_cell: impl FnMut(Range<usize>, &[Runs], &[u32], &mut [Block]),
     ) {
         self.runs.clear();
+        self.among.clear();
         self.found = false;
         let mut used = 0;
         let mut from = members.start;
@@ -168,7 +175,12 @@ impl NeighbourChunk {
             let all_asleep = (from..to).all(asleep);
             let mut candidates = 0;
             for &k in if all_asleep { &[] } else { acting(kind, around.fluids) } {
-                scratch.tile[k as usize].pack(simd, &around, k, cell, (kind, k) == (Kind::Rigid, Kind::Rigid));
+                let mut rows = [Row::default(); 27];
+                let rows = around.rows(k, cell, &mut rows);
+                if kind == Kind::Fluid && k != Kind::Static {
+                    self.note(rows);
+                }
+                scratch.tile[k as usize].pack(simd, &around, rows, (kind, k) == (Kind::Rigid, Kind::Rigid));
                 candidates += padded(scratch.tile[k as usize].len);
             }
             let first_run = self.runs.len();
@@ -216,6 +228,18 @@ impl NeighbourChunk {
         }
         self.used = used;
     }
+
+    /// Notes where was searched. Rows follow one another from cell to cell, so that most join one that is there.
+    #[inline(always)]
+    fn note(&mut self, rows: &[Row]) {
+        for row in rows {
+            let [begin, end] = [row.begin as u32, (row.begin + row.len) as u32];
+            match self.among.iter_mut().find(|[from, to]| begin >= *from && begin <= *to) {
+                Some([_, to]) => *to = end.max(*to),
+                None => self.among.push([begin, end]),
+            }
+        }
+    }
 }
 
 /// A run of particles that stands together in the sorted order, and how far to shift it (m).
@@ -227,13 +251,10 @@ struct Row {
 }
 
 impl Tile {
-    /// Packs the particles of kind `kind` in the 27 cells around `cell`; periodic images are shifted into place.
+    /// Packs rows of particles; periodic images are shifted into place.
     #[inline(always)]
-    fn pack<S: Simd>(&mut self, simd: S, around: &Around, kind: Kind, cell: [i32; 3], owners: bool) {
+    fn pack<S: Simd>(&mut self, simd: S, around: &Around, rows: &[Row], owners: bool) {
         self.len = 0;
-        let mut rows = [Row::default(); 27];
-        let count = around.rows(kind, cell, &mut rows);
-        let rows = &rows[..count];
         let room = rows.iter().map(|r| r.len).sum::<usize>().div_ceil(LANES) + 1;
         if rows.is_empty() {
             return;
@@ -269,13 +290,13 @@ impl Tile {
 }
 
 impl Around<'_> {
-    /// The rows of kind `kind` in the 27 cells around `cell`; returns how many.
+    /// The rows of kind `kind` in the 27 cells around `cell`.
     #[inline(always)]
-    fn rows(&self, kind: Kind, cell: [i32; 3], rows: &mut [Row; 27]) -> usize {
+    fn rows<'r>(&self, kind: Kind, cell: [i32; 3], rows: &'r mut [Row; 27]) -> &'r [Row] {
         let mut count = 0;
         let (grid, cells) = (self.grid, self.cells[kind as usize]);
         if !cells.are_near(grid, cell) {
-            return 0;
+            return &[];
         }
         let first = self.first[kind as usize];
         let mut add = |from: i32, to: i32, y: i32, z: i32, shift: [f32; 3]| {
@@ -301,6 +322,6 @@ impl Around<'_> {
                 }
             }
         }
-        count
+        &rows[..count]
     }
 }

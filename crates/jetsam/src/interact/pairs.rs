@@ -1,16 +1,17 @@
-//! Sums over the SPH pairs of one particle, sixteen neighbours at a time: E4, E5, and where they are asked for the
+//! Sums over SPH pairs, sixteen at a time: those of sixteen particles with one neighbour each, or of one with sixteen. E4, E5, and where they are asked for the
 //! rate of density (E1), XSPH (E6), surface tension (E7), the growth of vorticity (E8) and shifting.
 //!
-//! In: a particle, lists of neighbours, records. Out: force, rate, velocity it is carried by. Called by [`super::forces`].
+//! In: the particles on whose side is summed, lists of neighbours, records. Out: force, rate, velocity they are carried by, lane by lane. Called by
+//! [`super::forces`].
 
 use super::density::weights;
 use super::forces::Input;
 use super::lanes::{LANES, Lanes, Near, gather, minus, squares, sum};
+use super::slices::Own;
 use crate::laws::fluid;
 use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
 use crate::scene::{Density, Viscosity};
-use crate::state::Record;
 use fearless_simd::Simd;
 use glam::Vec3;
 
@@ -36,10 +37,10 @@ fn shortest(d: f32, period: f32) -> f32 {
 
 /// `d_ij` and its square for sixteen neighbours, by the shortest way on periodic axes.
 #[inline(always)]
-pub fn wrap_lanes<S: Simd>(simd: S, model: &Model, x: [f32; 3], other: &[Lanes; 3]) -> ([Lanes; 3], Lanes) {
+pub fn wrap_lanes<S: Simd>(simd: S, model: &Model, x: &[Lanes; 3], other: &[Lanes; 3]) -> ([Lanes; 3], Lanes) {
     let mut d = [[0.0; LANES]; 3];
     for a in 0..3 {
-        d[a] = minus(simd, &other[a], x[a]);
+        d[a] = minus(simd, &other[a], &x[a]);
         let period = model.grid.period[a];
         if period > 0.0 {
             for l in 0..LANES {
@@ -71,9 +72,18 @@ pub struct Terms {
     /// 1 where both are of one fluid, else 0.
     pub same: Lanes,
     /// Strength of cohesion (N/m^(2d)); 0 between fluids and towards bodies.
-    pub cohesion: f32,
+    pub cohesion: Lanes,
     /// Strength of the curvature term, alike.
-    pub curvature: f32,
+    pub curvature: Lanes,
+}
+
+impl Terms {
+    /// Pairs with nothing but pressure and viscosity `mu_i + mu_j` (Pa s).
+    #[inline(always)]
+    pub fn bare(mu_sum: Lanes) -> Self {
+        let zero = [0.0; LANES];
+        Self { mu_sum, eta: zero, same: zero, cohesion: zero, curvature: zero }
+    }
 }
 
 /// Sixteen pairs, lane by lane.
@@ -87,13 +97,13 @@ struct Sixteen<'a> {
     seen: &'a [Lanes; 3],
 }
 
-/// The sums of one particle.
+/// The sums of sixteen lanes.
 pub struct Pairs<'a> {
     model: &'a Model,
     mirror: &'a [[f32; 4]],
     gradient: &'a [[f32; 4]],
-    i: u32,
-    own: &'a Record,
+    own: Own,
+    own_share: Lanes,
     kernel: Kernel,
     g_factor: f32,
     inverse: f32,
@@ -112,41 +122,58 @@ pub struct Pairs<'a> {
     growth: [Lanes; 3],
 }
 
-/// Constants of density diffusion for the fluid of one particle.
+/// Constants of density diffusion for the fluid of each lane.
 #[derive(Clone, Copy)]
 struct Diffusion {
-    rate: f32,
-    stiffness: f32,
-    pull: Vec3,
+    rate: Lanes,
+    stiffness: Lanes,
+    density: Lanes,
+    gravity: Vec3,
 }
 
 impl<'a> Pairs<'a> {
-    /// Sums for particle `i`, of fluid `fluid` if it is fluid.
+    /// Sums for fluid particles, or else one of a body.
     #[inline(always)]
-    pub fn new(input: &Input<'a>, i: usize, fluid: Option<u32>) -> Self {
-        let Input { model, records, mirror, gradient, .. } = *input;
+    pub fn new(input: &Input<'a>, own: Own, fluid: bool) -> Self {
+        let Input { model, mirror, gradient, owner, .. } = *input;
         let solver = &model.solver;
-        let continuity = fluid.filter(|_| solver.density == Density::Continuity).map(|f| {
-            let f = &model.fluids[f as usize];
-            Diffusion { rate: f.diffusion, stiffness: f.stiffness, pull: f.density * input.gravity }
+        let continuity = (fluid && solver.density == Density::Continuity).then(|| {
+            let mut diffusion = Diffusion {
+                rate: [0.0; LANES],
+                stiffness: [0.0; LANES],
+                density: [0.0; LANES],
+                gravity: input.gravity,
+            };
+            for l in 0..LANES {
+                let f = &model.fluids[owner[own.i[l] as usize] as usize];
+                (diffusion.rate[l], diffusion.stiffness[l]) = (f.diffusion, f.stiffness);
+                diffusion.density[l] = f.density;
+            }
+            diffusion
         });
+        let floor = if solver.negative_pressure { f32::NEG_INFINITY } else { 0.0 };
+        // implicit pressure has pushed already
+        let ceiling = if model.implicit() { 0.0 } else { f32::INFINITY };
+        let mut own_share = own.at.share;
+        for l in 0..LANES {
+            own_share[l] = own_share[l].max(floor).min(ceiling);
+        }
         Self {
             model,
             mirror,
             gradient,
-            i: i as u32,
-            own: &records[i],
+            own,
+            own_share,
             kernel: model.kernel.force(),
             g_factor: model.factors.g,
             inverse: model.inverse_support(),
             softening: model.softening(),
-            floor: if solver.negative_pressure { f32::NEG_INFINITY } else { 0.0 },
-            // implicit pressure has pushed already
-            ceiling: if model.implicit() { 0.0 } else { f32::INFINITY },
+            floor,
+            ceiling,
             mueller: (solver.viscosity == Viscosity::Mueller).then_some(model.factors.laplacian),
             continuity,
-            shift: fluid.is_some() && solver.shifting > 0.0,
-            xsph: fluid.is_some() && solver.xsph > 0.0,
+            shift: fluid && solver.shifting > 0.0,
+            xsph: fluid && solver.xsph > 0.0,
             force: [[0.0; LANES]; 3],
             rate: [0.0; LANES],
             carry: [[0.0; LANES]; 3],
@@ -156,14 +183,14 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// Adds sixteen neighbours. `PLAIN`: nothing but E4 and E5 is asked for.
+    /// Adds sixteen pairs. `PLAIN`: nothing but E4 and E5 is asked for.
     #[inline(always)]
     pub fn add<S: Simd, const PLAIN: bool>(&mut self, simd: S, near: Near, ends: Ends, terms: &Terms) {
         let other = gather(simd, near);
-        let (d, r_sq) = wrap_lanes(simd, self.model, self.own.x, &other.x);
+        let (d, r_sq) = wrap_lanes(simd, self.model, &self.own.at.x, &other.x);
         let mut v = [[0.0; LANES]; 3];
         for a in 0..3 {
-            v[a] = minus(simd, &other.v[a], self.own.v[a]);
+            v[a] = minus(simd, &other.v[a], &self.own.at.v[a]);
         }
         let mirrored = !PLAIN && ends != Ends::Fluids && !self.mirror.is_empty();
         let seen = if mirrored { self.slipless(near.index, ends, &other.v) } else { v };
@@ -174,7 +201,7 @@ impl<'a> Pairs<'a> {
         }
         if let Some(factor) = self.mueller {
             for l in 0..LANES {
-                let volumes = self.own.volume * other.volume[l];
+                let volumes = self.own.at.volume[l] * other.volume[l];
                 let laplacian = Kernel::Viscosity.g(r_sq[l].sqrt() * self.inverse);
                 let along_v = fluid::viscosity_mueller(volumes, terms.mu_sum[l], factor * laplacian);
                 for a in 0..3 {
@@ -185,7 +212,7 @@ impl<'a> Pairs<'a> {
         if let Some(diffusion) = self.continuity {
             self.add_rate(ends, &pairs, &g, terms, diffusion);
         }
-        if ends == Ends::Fluids && terms.cohesion + terms.curvature > 0.0 {
+        if ends == Ends::Fluids && self.model.tension() {
             self.add_tension(near.index, terms, &pairs);
         }
         if ends == Ends::Fluids && self.model.solver.vorticity > 0.0 {
@@ -206,15 +233,15 @@ impl<'a> Pairs<'a> {
     #[inline(always)]
     fn add_forces<const PLAIN: bool>(&mut self, kernel: Kernel, pairs: &Sixteen, terms: &Terms) -> Lanes {
         let Sixteen { volume, share, d, r_sq, v, seen } = pairs;
-        let (own, own_share) = (self.own, self.own.share.max(self.floor).min(self.ceiling));
+        let (own, own_share) = (&self.own.at.volume, &self.own_share);
         let laminar = if !PLAIN && self.mueller.is_some() { 0.0 } else { 1.0 };
         let mut out = [0.0; LANES];
         for l in 0..LANES {
             let g = self.g_factor * kernel.g(r_sq[l].sqrt() * self.inverse);
-            let volumes = own.volume * volume[l];
+            let volumes = own[l] * volume[l];
             let v_dot_d = v[0][l] * d[0][l] + v[1][l] * d[1][l] + v[2][l] * d[2][l];
             let inverse_sq = fluid::softened_inverse(r_sq[l], self.softening);
-            let along_d = fluid::pressure_force(volumes, own_share, share[l].max(self.floor).min(self.ceiling), g)
+            let along_d = fluid::pressure_force(volumes, own_share[l], share[l].max(self.floor).min(self.ceiling), g)
                 + fluid::viscosity_artificial(volumes, terms.eta[l], v_dot_d, inverse_sq, g);
             let along_v = fluid::viscosity_laminar(volumes, laminar * terms.mu_sum[l], r_sq[l], inverse_sq, g);
             self.force[0][l] += along_d * d[0][l] + along_v * seen[0][l];
@@ -236,34 +263,33 @@ impl<'a> Pairs<'a> {
         if ends != Ends::Fluids {
             return;
         }
-        let Diffusion { rate, stiffness, pull } = diffusion;
+        let Diffusion { rate, stiffness, density, gravity } = diffusion;
         for l in 0..LANES {
-            let weight = pull.x * d[0][l] + pull.y * d[1][l] + pull.z * d[2][l];
-            let rate = rate * terms.same[l];
-            self.rate[l] +=
-                fluid::density_diffusion(volume[l], self.own.share, share[l], weight, rate, stiffness, g[l]);
+            let weight = density[l] * (gravity.x * d[0][l] + gravity.y * d[1][l] + gravity.z * d[2][l]);
+            let rate = rate[l] * terms.same[l];
+            let own = self.own.at.share[l];
+            self.rate[l] += fluid::density_diffusion(volume[l], own, share[l], weight, rate, stiffness[l], g[l]);
         }
     }
 
     /// E7: cohesion and curvature.
     #[inline(always)]
     fn add_tension(&mut self, list: &[u32; LANES], terms: &Terms, pairs: &Sixteen) {
-        let Sixteen { d, r_sq, .. } = pairs;
-        let volumes = self.own.volume * self.own.volume; // of one fluid, all alike
+        let Sixteen { volume, d, r_sq, .. } = pairs;
+        let own = &self.own.at.volume;
         for l in 0..LANES {
             let r = r_sq[l].sqrt();
-            let along_d = fluid::cohesion(volumes, terms.cohesion * terms.same[l], r * self.inverse, r);
+            let along_d = fluid::cohesion(own[l] * volume[l], terms.cohesion[l] * terms.same[l], r * self.inverse, r);
             for a in 0..3 {
                 self.force[a][l] += along_d * d[a][l];
             }
         }
-        if terms.curvature == 0.0 {
+        if self.gradient.is_empty() {
             return;
         }
-        let own = self.gradient[self.i as usize];
         for l in 0..LANES {
-            let factor = fluid::curvature(volumes, terms.curvature * terms.same[l]);
-            let other = self.gradient[list[l] as usize];
+            let factor = fluid::curvature(own[l] * volume[l], terms.curvature[l] * terms.same[l]);
+            let (own, other) = (self.gradient[self.own.i[l] as usize], self.gradient[list[l] as usize]);
             for a in 0..3 {
                 self.force[a][l] += factor * (other[a] - own[a]);
             }
@@ -290,7 +316,7 @@ impl<'a> Pairs<'a> {
         if self.shift {
             let reach = model.support as f32;
             for l in 0..LANES {
-                self.full[l] += if list[l] == self.i { 0.0 } else { volume[l] * w[l] }; // padding is the particle
+                self.full[l] += if list[l] == self.own.i[l] { 0.0 } else { volume[l] * w[l] }; // padding is the particle
                 let factor = fluid::shifting(volume[l], w[l], model.factors.w_spacing, reach, g[l]);
                 for a in 0..3 {
                     self.drive[a][l] += factor * d[a][l];
@@ -303,57 +329,63 @@ impl<'a> Pairs<'a> {
     #[inline(always)]
     fn slipless(&self, list: &[u32; LANES], ends: Ends, other: &[Lanes; 3]) -> [Lanes; 3] {
         let mut v = [[0.0; LANES]; 3];
-        let own = if ends == Ends::OnBody {
-            self.mirror[self.i as usize]
-        } else {
-            let [x, y, z] = self.own.v;
-            [x, y, z, 0.0]
-        };
         for l in 0..LANES {
-            if list[l] == self.i {
+            if list[l] == self.own.i[l] {
                 continue; // padding
             }
             for a in 0..3 {
-                let seen = if ends == Ends::OnFluid { self.mirror[list[l] as usize][a] } else { other[a][l] };
-                v[a][l] = seen - own[a];
+                v[a][l] = match ends {
+                    Ends::OnFluid => self.mirror[list[l] as usize][a] - self.own.at.v[a][l],
+                    Ends::OnBody => other[a][l] - self.mirror[self.own.i[l] as usize][a],
+                    Ends::Fluids => other[a][l] - self.own.at.v[a][l],
+                };
             }
         }
         v
     }
 
-    /// Where vorticity grows.
+    /// Where vorticity grows, in a lane.
     #[inline(always)]
-    pub fn growth<S: Simd>(&self, simd: S) -> Vec3 {
-        Vec3::new(sum(simd, &self.growth[0]), sum(simd, &self.growth[1]), sum(simd, &self.growth[2]))
+    pub fn growth(&self, l: usize) -> Vec3 {
+        lane(&self.growth, l)
     }
 
-    /// Sum of the forces (N).
+    /// Force (N) in a lane.
     #[inline(always)]
-    pub fn force<S: Simd>(&self, simd: S) -> Vec3 {
+    pub fn force(&self, l: usize) -> Vec3 {
+        lane(&self.force, l)
+    }
+
+    /// Sum of the forces of all lanes (N): those of one particle.
+    #[inline(always)]
+    pub fn total<S: Simd>(&self, simd: S) -> Vec3 {
         Vec3::new(sum(simd, &self.force[0]), sum(simd, &self.force[1]), sum(simd, &self.force[2]))
     }
 
-    /// `dD/dt` (1/s); zero where densities are summed.
+    /// `dD/dt` (1/s) in a lane; zero where densities are summed.
     #[inline(always)]
-    pub fn rate<S: Simd>(&self, simd: S) -> f32 {
-        if self.continuity.is_some() { sum(simd, &self.rate) } else { 0.0 }
+    pub fn rate(&self, l: usize) -> f32 {
+        if self.continuity.is_some() { self.rate[l] } else { 0.0 }
     }
 
-    /// Velocity added to the particle's own when it drifts (m/s). `fastest` is the largest speed (m/s).
+    /// Velocity added to a lane's particle's own when it drifts (m/s). `fastest` is the largest speed (m/s).
     #[inline(always)]
-    pub fn carry<S: Simd>(&self, simd: S, fastest: f32) -> Vec3 {
-        let mut carry = Vec3::ZERO;
-        if self.xsph {
-            carry = Vec3::new(sum(simd, &self.carry[0]), sum(simd, &self.carry[1]), sum(simd, &self.carry[2]));
-        }
+    pub fn carry(&self, l: usize, fastest: f32) -> Vec3 {
+        let mut carry = if self.xsph { lane(&self.carry, l) } else { Vec3::ZERO };
         // only inside a fluid: at a free surface the gap would draw particles out
         let inner = SHIFTED_ABOVE - self.model.factors.w_own * self.model.volume as f32;
-        if self.shift && sum(simd, &self.full) > inner {
-            let drive = Vec3::new(sum(simd, &self.drive[0]), sum(simd, &self.drive[1]), sum(simd, &self.drive[2]));
-            carry += (self.model.solver.shifting as f32 * fastest * drive).clamp_length_max(0.5 * fastest);
+        if self.shift && self.full[l] > inner {
+            let drive = self.model.solver.shifting as f32 * fastest * lane(&self.drive, l);
+            carry += drive.clamp_length_max(0.5 * fastest);
         }
         carry
     }
+}
+
+/// One lane of a vector.
+#[inline(always)]
+fn lane(of: &[Lanes; 3], l: usize) -> Vec3 {
+    Vec3::new(of[0][l], of[1][l], of[2][l])
 }
 
 /// Particles with at least this much of a full neighbourhood `sum V_j W_ij` are shifted.

@@ -7,8 +7,9 @@ use super::{CHUNK, Cpu, GONE};
 use crate::integrate::{Advance, bodies};
 use crate::interact::cells::DRAINED;
 use crate::interact::implicit::{self, Round, Said, Shares};
-use crate::interact::lanes::Links;
-use crate::interact::links::{self, Node};
+use crate::interact::lanes::LANES;
+use crate::interact::links::{self, Links, Nodes};
+use crate::interact::neighbours::with_scratch;
 use crate::ledger::Solve;
 use crate::model::Model;
 use crate::scene::Wall;
@@ -29,7 +30,7 @@ const WORSE: f64 = 10.0;
 #[derive(Default)]
 pub(super) struct Implicit {
     links: Vec<Links>,
-    nodes: Vec<Node>,
+    nodes: Vec<Nodes>,
     share: Vec<f32>,
     hold: Vec<f32>,
     found: Vec<f32>,
@@ -83,18 +84,16 @@ impl Cpu {
         let n = p.count[Kind::Fluid as usize];
         let Implicit { links, nodes, .. } = &mut self.implicit;
         links.resize_with(n.div_ceil(CHUNK), Links::default);
-        nodes.resize(n, Node::default());
+        nodes.resize(n.div_ceil(LANES), Nodes::default());
         let gravity = gravity.as_vec3();
         let input = links::Input { model, records: &p.record, owner: &p.owner, bodies: &b.body, gravity };
         let level = self.level;
-        let chunks = links.par_iter_mut().zip(nodes.par_chunks_mut(CHUNK)).zip(&self.neighbours[Kind::Fluid as usize]);
-        chunks.zip(p.density[..n].par_chunks_mut(CHUNK)).enumerate().for_each(
-            |(c, (((links, nodes), chunk), density))| {
-                dispatch!(level, simd => {
-                    links::chunk::<_, DENSITY>(simd, input, c * CHUNK, chunk, links, nodes, density);
-                });
-            },
-        );
+        let chunks = links.par_iter_mut().zip(nodes.par_chunks_mut(CHUNK / LANES)).zip(&self.slices);
+        chunks.zip(p.density[..n].par_chunks_mut(CHUNK)).for_each(|(((links, nodes), slices), density)| {
+            dispatch!(level, simd => {
+                links::chunk::<_, DENSITY>(simd, input, slices, links, nodes, density);
+            });
+        });
     }
 
     /// Accelerations by the present shares, of fluids and of the bodies that answer.
@@ -112,9 +111,13 @@ impl Cpu {
     fn push_fluids(&mut self) {
         let Implicit { links, nodes, share, hold, flow, .. } = &mut self.implicit;
         let (share, hold, level) = (&share[..], &hold[..], self.level);
-        let chunks = flow[..nodes.len()].par_chunks_mut(CHUNK).zip(nodes.par_chunks(CHUNK)).zip(links).enumerate();
+        let fluids = flow[..hold.len()].par_chunks_mut(CHUNK);
+        let chunks = fluids.zip(nodes.par_chunks(CHUNK / LANES)).zip(links).enumerate();
         chunks.for_each(|(c, ((flow, nodes), links))| {
-            dispatch!(level, simd => implicit::accelerate(simd, links, nodes, share, hold, c * CHUNK, flow));
+            with_scratch(|scratch| {
+                let table = &mut scratch.places;
+                dispatch!(level, simd => implicit::accelerate(simd, table, links, nodes, share, hold, c * CHUNK, flow));
+            });
         });
     }
 
@@ -195,16 +198,21 @@ impl Cpu {
     fn relax(&mut self, round: Round) -> Said {
         let level = self.level;
         let Implicit { links, nodes, flow, share, hold, found, error, rate, said, .. } = &mut self.implicit;
-        said.resize(nodes.len().div_ceil(CHUNK), Said::default());
+        said.resize(links.len(), Said::default());
         let flow = &flow[..];
         let shares = share.par_chunks_mut(CHUNK).zip(hold.par_chunks_mut(CHUNK)).zip(found.par_chunks_mut(CHUNK));
-        let read = nodes.par_chunks(CHUNK).zip(error.par_chunks(CHUNK)).zip(links.par_iter());
+        let read = nodes.par_chunks(CHUNK / LANES).zip(error.par_chunks(CHUNK)).zip(links.par_iter());
         let all = said.par_iter_mut().zip(rate.par_chunks_mut(CHUNK)).zip(shares.zip(read)).enumerate();
         all.for_each(|(c, ((said, rate), (((share, hold), found), ((nodes, error), links))))| {
-            if !round.first {
-                dispatch!(level, simd => implicit::rates(simd, links, nodes, flow, c * CHUNK, rate));
-            }
-            *said = implicit::relax(round, nodes, error, rate, Shares { share, hold, found });
+            with_scratch(|scratch| {
+                let table = &mut scratch.places;
+                dispatch!(level, simd => {
+                    if !round.first {
+                        implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate);
+                    }
+                    *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, found });
+                });
+            });
         });
         said.iter()
             .fold(Said::default(), |sum, s| Said { error: sum.error + s.error, against: sum.against + s.against })
@@ -216,7 +224,8 @@ impl Cpu {
         let (n, total) = (p.count[Kind::Fluid as usize], p.record.len());
         let limit = model.hold_limit();
         let s = &mut self.implicit;
-        s.share.resize(total, 0.0); // links name bodies' particles too
+        s.share.resize(total, 0.0);
+        s.share[n..].fill(0.0); // links name bodies' particles too
         s.hold.resize(n, 0.0);
         s.found.resize(n, 0.0);
         s.error.resize(n, 0.0);
@@ -226,7 +235,8 @@ impl Cpu {
         s.thrust.clear();
         s.thrust.resize(self.state.bodies.body.len(), [DVec3::ZERO; 2]);
         s.added.resize(self.state.bodies.body.len(), [DVec3::ZERO; 2]);
-        let all = s.share.par_iter_mut().zip(s.hold.par_iter_mut()).zip(s.found.par_iter_mut()).with_min_len(CHUNK);
+        let all =
+            s.share[..n].par_iter_mut().zip(s.hold.par_iter_mut()).zip(s.found.par_iter_mut()).with_min_len(CHUNK);
         all.enumerate().for_each(|(i, ((share, hold), found))| {
             *share = warm(i);
             *found = *share;
@@ -261,8 +271,8 @@ impl Cpu {
                 self.implicit.impulse -= advance.dt * thrust[0];
             }
         }
-        let Implicit { nodes, share, flow, .. } = &self.implicit;
-        let records = self.state.particles.record[..nodes.len()].par_iter_mut().with_min_len(CHUNK);
+        let Implicit { hold, share, flow, .. } = &self.implicit;
+        let records = self.state.particles.record[..hold.len()].par_iter_mut().with_min_len(CHUNK);
         records.zip(share).zip(flow).for_each(|((r, share), a)| {
             r.share = *share;
             (0..3).for_each(|c| r.v[c] += advance.dt as f32 * a[c]);
@@ -290,7 +300,7 @@ impl Cpu {
     /// Rounds until the mean error is small; `flow` is then what the shares do, and `thrust` what they do to rigid bodies.
     fn solve(&mut self, model: &Model, advance: Advance, aim: Aim) -> Solve {
         let gravity = model.gravity_at(advance.end());
-        let (n, dt) = (self.implicit.nodes.len(), advance.dt as f32);
+        let (n, dt) = (self.implicit.hold.len(), advance.dt as f32);
         if n == 0 || dt == 0.0 {
             return Solve::default();
         }
@@ -340,17 +350,20 @@ impl Cpu {
     fn errors(&mut self, dt: f32, aim: Aim) {
         let (level, p) = (self.level, &self.state.particles);
         let Implicit { links, nodes, flow, error, rate, .. } = &mut self.implicit;
-        let n = nodes.len();
+        let n = error.len();
         if aim == Aim::Velocities {
             let flow = flow[..n].par_iter_mut().with_min_len(CHUNK);
             flow.zip(&p.record).for_each(|(u, r)| *u = [r.v[0], r.v[1], r.v[2], 0.0]);
         }
         let flow = &flow[..];
-        let read = nodes.par_chunks(CHUNK).zip(p.density[..n].par_chunks(CHUNK)).zip(links.par_iter());
+        let read = nodes.par_chunks(CHUNK / LANES).zip(p.density[..n].par_chunks(CHUNK)).zip(links.par_iter());
         let all = error.par_chunks_mut(CHUNK).zip(rate.par_chunks_mut(CHUNK)).zip(read).enumerate();
         all.for_each(|(c, ((error, rate), ((nodes, density), links)))| {
             if aim == Aim::Velocities {
-                dispatch!(level, simd => implicit::rates(simd, links, nodes, flow, c * CHUNK, rate));
+                with_scratch(|scratch| {
+                    let table = &mut scratch.places;
+                    dispatch!(level, simd => implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate));
+                });
             }
             for ((error, rate), density) in error.iter_mut().zip(rate).zip(density) {
                 *error = match aim {
@@ -408,7 +421,7 @@ impl Cpu {
     /// Moves particles by this round's accelerations, and bodies by its thrusts, which are added to `total`.
     fn shift(&mut self, model: &Model, advance: Advance, total: &mut [[DVec3; 2]]) {
         let dt = advance.dt;
-        let flow = &self.implicit.flow[..self.implicit.nodes.len()];
+        let flow = &self.implicit.flow[..self.implicit.hold.len()];
         let records = self.state.particles.record[..flow.len()].par_iter_mut().with_min_len(CHUNK);
         records.zip(flow).for_each(|(r, a)| {
             for c in 0..3 {
