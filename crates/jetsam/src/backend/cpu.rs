@@ -342,7 +342,9 @@ impl Cpu {
             );
         }
         p.count[Kind::Fluid as usize] = living;
-
+        let order = std::mem::take(&mut self.cells[Kind::Fluid as usize].order);
+        self.sort_places(|k| order[k].load(Relaxed) as usize);
+        self.cells[Kind::Fluid as usize].order = order;
         self.copy_bodies(grid, Kind::Rigid);
         // static particles stay where they are: once into each half of the double buffer
         if self.static_copies < 2 {

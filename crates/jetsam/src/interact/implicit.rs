@@ -106,8 +106,6 @@ pub struct Round {
     pub momentum: f32,
     /// Pressure up to which gravity fades out between fluids and bodies (Pa).
     pub limit: f32,
-    /// Whether nothing pushes yet, so that there are no rates.
-    pub first: bool,
 }
 
 /// Shares of a chunk (Pa).

@@ -19,8 +19,6 @@ const TURNS: u32 = 3u;
 fn in_round() -> bool { return clock.running != 0u && solve.phase == ROUNDS; }
 fn ended() -> bool { return clock.running != 0u && solve.phase == ENDING; }
 fn pushes() -> bool { return in_round() || ended(); }
-// Places begin without shares: there is nothing to push yet.
-fn nothing_yet() -> bool { return !PBF && solve.number == PLACES && solve.iterations == 0u && solve.phase == ROUNDS; }
 
 fn begin(number: u32) {
   solve.number = number;
@@ -127,22 +125,23 @@ fn errors_of_velocities(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgr
   if (!ended() || i >= live_fluid()) { return; }
   work[i].y = clock.dt * rate_of(i) + min(push[i].w - 1.0, 0.0);
 }
-// Places begin with what velocities have left, and without shares.
+// Places begin with what velocities have left, and with shares of the last step, which `glide` has handed on.
 @compute @workgroup_size(128)
 fn errors_of_places(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let i = number(g, n, l, 128u);
   if (clock.running == 0u || i >= first_static()) { return; }
   flow[i] = vec4<f32>(0.0);
   if (i >= live_fluid()) { return; }
-  work[i] = vec4<f32>(0.0, work[i].y + max(push[i].w - 1.0, 0.0), 0.0, 0.0);
-  spot[i].w = 0.0;
+  let share = begun(before[i].w, nodes[i].all.w, clock.dt);
+  work[i] = vec4<f32>(share, work[i].y + max(push[i].w - 1.0, 0.0), 0.0, 0.0);
+  spot[i].w = share;
 }
 
 // A round: accelerations of fluids by the shares of all.
 @compute @workgroup_size(128)
 fn accelerate(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let i = number(g, n, l, 128u);
-  if (!pushes() || nothing_yet() || i >= live_fluid()) { return; }
+  if (!pushes() || i >= live_fluid()) { return; }
   let own = spot[i];
   let limit = m.upper.w * m.upper.w;
   var total = vec3<f32>(0.0);
@@ -229,8 +228,7 @@ fn relax(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u
   if (l == 0u && in_round()) { said[g.y * n.x + g.x] = vec4<f32>(judged[0], 0.0, 0.0); }
 }
 fn relax_one(i: u32) -> vec2<f32> {
-  var rate = 0.0;
-  if (!nothing_yet()) { rate = rate_of(i); }
+  let rate = rate_of(i);
   let w = work[i];
   let share = spot[i].w;
   let answer = nodes[i].all.w;

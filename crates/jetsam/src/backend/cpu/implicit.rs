@@ -34,6 +34,8 @@ pub(super) struct Implicit {
     share: Vec<f32>,
     hold: Vec<f32>,
     found: Vec<f32>,
+    /// Shares (Pa) that corrected places at the last step, in the order of today.
+    places: Vec<f32>,
     /// Accelerations, or velocities (m/s), of fluids and rigid bodies' particles.
     pub(super) flow: Vec<[f32; 4]>,
     error: Vec<f32>,
@@ -207,9 +209,7 @@ impl Cpu {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => {
-                    if !round.first {
-                        implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate);
-                    }
+                    implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate);
                     *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, found });
                 });
             });
@@ -282,8 +282,17 @@ impl Cpu {
     /// Stage `pressure` of DFSPH: accelerations by which the drift leaves no density above that of rest. They move places alone:
     /// a velocity would stay, and heat the fluid.
     pub(super) fn solve_places(&mut self, model: &Model, advance: Advance) {
-        self.prepare(model, |_| 0.0);
+        let Implicit { places, nodes, hold, .. } = &self.implicit;
+        let begun = |i: usize| {
+            let before = places.get(i).copied().unwrap_or(0.0);
+            crate::laws::implicit::begun(before, nodes[i / LANES].response[i % LANES], advance.dt as f32)
+        };
+        let warm: Vec<f32> = (0..hold.len()).into_par_iter().with_min_len(CHUNK).map(begun).collect();
+        self.prepare(model, |i| warm[i]);
         self.implicit.pressure = self.solve(model, advance, Aim::Places);
+        let Implicit { places, share, hold, .. } = &mut self.implicit;
+        places.clear();
+        places.extend_from_slice(&share[..hold.len()]);
     }
 
     /// The particles of rigid bodies show the velocities that their slots have.
@@ -311,14 +320,10 @@ impl Cpu {
         };
         let scale = dt * dt;
         let limit = model.hold_limit();
-        let mut round = Round { omega: OMEGA / scale, scale, momentum: 0.0, limit, first: true };
+        let mut round = Round { omega: OMEGA / scale, scale, momentum: 0.0, limit };
         let (mut said, mut pace, mut best) = (Solve::default(), 1.0f32, f64::INFINITY);
         loop {
-            // places begin without shares: there is nothing to push yet
-            round.first = aim == Aim::Places && said.iterations == 0;
-            if !round.first {
-                self.accelerate(model, advance, gravity, aim);
-            }
+            self.accelerate(model, advance, gravity, aim);
             let next = 0.5 * (1.0 + (1.0 + 4.0 * pace * pace).sqrt());
             round.momentum = (pace - 1.0) / next;
             let Said { error, against } = self.relax(round);
@@ -374,6 +379,16 @@ impl Cpu {
                 *rate = 0.0;
             }
         });
+    }
+
+    /// Shares that corrected places go with their particles when fluids change places: from where each comes.
+    pub(super) fn sort_places(&mut self, order: impl Fn(usize) -> usize + Sync) {
+        let old = std::mem::take(&mut self.implicit.places);
+        if !old.is_empty() {
+            let n = self.state.particles.count[Kind::Fluid as usize];
+            let sorted = (0..n).into_par_iter().with_min_len(CHUNK).map(|k| old.get(order(k)).copied().unwrap_or(0.0));
+            self.implicit.places = sorted.collect();
+        }
     }
 
     /// Stage `pressure` of PBF: particles moved until no density is above that of rest. Rounds are made for the vectors to neighbours

@@ -73,7 +73,9 @@ fn glide(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     own = p.said;
     var rates = vec4<f32>(0.0);
     if (MORTAL) { rates = rate[i]; }
-    drifted[i] = Drifted(vec4<f32>(p.x, r.x.w), vec4<f32>(p.v, r.v.w), push[i], rates, info[i].x, info[i].y, vec2<u32>(0u));
+    // densities are found anew: in their place goes the share by which places begin at the next step
+    let a = vec4<f32>(push[i].xyz, select(spot[i].w, 0.0, PBF));
+    drifted[i] = Drifted(vec4<f32>(p.x, r.x.w), vec4<f32>(p.v, r.v.w), a, rates, info[i].x, info[i].y, vec2<u32>(0u));
   }
   say_put(g.y * n.x + g.x, l, own);
 }
