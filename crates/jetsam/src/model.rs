@@ -13,6 +13,8 @@ use std::f64::consts::PI;
 
 /// Contacts are looked for within so many contact diameters: farther than a pair parts or meets in half a step.
 pub const CONTACT_REACH: f64 = 1.5;
+/// Lists of contacts reach so many contact diameters farther, and hold until something has moved by half of that.
+pub const CONTACT_SKIN: f64 = 0.4;
 
 /// Constants of a world.
 #[derive(Clone, Debug)]
@@ -311,41 +313,9 @@ impl Model {
         !(self.moves(a) || self.moves(b)) || self.contacts[a as usize].joined.contains(&b)
     }
 
-    /// Reduced mass of bodies `a` and `b` (kg).
-    #[inline]
-    pub fn reduced_mass(&self, a: u32, b: u32) -> f32 {
-        1.0 / (self.contacts[a as usize].inverse_mass + self.contacts[b as usize].inverse_mass)
-    }
-
-    /// Dashpot (N s/m) that takes the speed of approach of bodies `a` and `b` within a step if as many contacts as a
-    /// face has particles share it, and never more (E12).
-    #[inline]
-    pub fn stop(&self, a: u32, b: u32, dt: f32) -> f32 {
-        let mass = self.reduced_mass(a, b);
-        let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
-        if dt > 0.0 { mass / (dt * a.face.max(b.face)) } else { 0.0 }
-    }
-
     /// Whether any body rubs (E13).
     pub fn rubs(&self) -> bool {
         self.solver.damping == Damping::Normal && self.contacts.iter().any(|c| c.inverse_mass > 0.0 && c.friction > 0.0)
-    }
-
-    /// Tangential spring (N/m), its dashpot (N s/m) and friction of one contact of bodies `a` and `b` with the normal
-    /// spring `k` times `part`, while `counted` contacts share the load (E13). Symmetric to the last bit.
-    #[inline]
-    pub fn friction_pair(&self, a: u32, b: u32, k: f32, part: f32, counted: f32) -> (f32, f32, f32) {
-        let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
-        let mu = match (a.friction < 0.0, b.friction < 0.0) {
-            (true, _) => b.friction,
-            (_, true) => a.friction,
-            _ => (a.friction * b.friction).sqrt(),
-        };
-        let mass = 1.0 / (a.inverse_mass + b.inverse_mass);
-        let n = a.shared_by.max(b.shared_by).max(counted);
-        let k_t = TANGENTIAL * k;
-        let eta_t = part * crate::laws::contact::dashpot(TANGENTIAL_DAMPING, k_t / part * n, mass) / n;
-        (k_t, eta_t, mu)
     }
 
     /// In how many steps of bodies a step of `dt` (s) is to be cut for contacts, while the fastest particle of a body moves at
@@ -366,25 +336,14 @@ impl Model {
     /// Symmetric to the last bit.
     #[inline]
     pub fn contact_pair(&self, a: u32, b: u32) -> (f32, f32) {
-        self.contact_pair_of(a, b, 1.0)
-    }
-
-    /// The same while `counted` contacts share the load: the dashpot's part is the smaller.
-    #[inline]
-    pub fn contact_pair_of(&self, a: u32, b: u32, counted: f32) -> (f32, f32) {
         let (a, b) = (&self.contacts[a as usize], &self.contacts[b as usize]);
         let reduced_mass = 1.0 / (a.inverse_mass + b.inverse_mass);
-        self.contact_constants(
+        Self::contact_constants(
             reduced_mass,
-            match (a.inverse_mass == 0.0, b.inverse_mass == 0.0) {
-                (true, _) => b.ln_restitution, // what does not move takes the restitution of what does
-                (_, true) => a.ln_restitution,
-                _ => 0.5 * (a.ln_restitution + b.ln_restitution),
-            },
-            a.shared_by.max(b.shared_by),
-            counted,
-            a.stiffness.max(b.stiffness),
-            a.damping.max(b.damping),
+            Self::ln_restitution(a.inverse_mass, a.ln_restitution, b.inverse_mass, b.ln_restitution),
+            [a.shared_by.max(b.shared_by), 1.0],
+            self.contact_rate(),
+            [a.stiffness.max(b.stiffness), a.damping.max(b.damping)],
         )
     }
 
@@ -393,7 +352,7 @@ impl Model {
     pub fn coupling_pair(&self, fluid: u32, b: u32) -> (f32, f32) {
         let b = &self.contacts[b as usize];
         let reduced_mass = 1.0 / (1.0 / self.fluids[fluid as usize].mass + b.inverse_mass);
-        self.contact_constants(reduced_mass, b.ln_restitution, 1.0, 1.0, b.stiffness, b.damping)
+        Self::contact_constants(reduced_mass, b.ln_restitution, [1.0; 2], self.contact_rate(), [b.stiffness, b.damping])
     }
 
     /// Spring constant and dashpot between an agent of a mass (kg) and a particle of body `b` (E14, E28).
@@ -401,30 +360,44 @@ impl Model {
     pub fn agent_pair(&self, mass: f32, b: u32) -> (f32, f32) {
         let b = &self.contacts[b as usize];
         let reduced_mass = 1.0 / (1.0 / mass + b.inverse_mass);
-        self.contact_constants(reduced_mass, b.ln_restitution, 1.0, 1.0, b.stiffness, b.damping)
+        Self::contact_constants(reduced_mass, b.ln_restitution, [1.0; 2], self.contact_rate(), [b.stiffness, b.damping])
     }
 
+    /// Logarithm of the restitution of two bodies of inverse masses `i_a` and `i_b`: what does not move takes that of what does.
+    #[inline(always)]
+    pub(crate) fn ln_restitution(i_a: f32, ln_a: f32, i_b: f32, ln_b: f32) -> f32 {
+        match (i_a == 0.0, i_b == 0.0) {
+            (true, _) => ln_b,
+            (_, true) => ln_a,
+            _ => 0.5 * (ln_a + ln_b),
+        }
+    }
+
+    /// Friction of two bodies (E13): where one does not say, that of the other.
+    #[inline(always)]
+    pub(crate) fn friction_of(a: f32, b: f32) -> f32 {
+        let mean = (a * b).sqrt();
+        let known = if b < 0.0 { a } else { mean };
+        if a < 0.0 { b } else { known }
+    }
+
+    /// `(u / overlap)^2` of E14 (1/s^2): with it, all sharers together stop a mass at the scene's largest speed within the allowed overlap.
     #[inline]
-    fn contact_constants(
-        &self,
-        mass: f32,
-        ln_e: f32,
-        shared_by: f32,
-        counted: f32,
-        stated_k: f32,
-        stated_eta: f32,
-    ) -> (f32, f32) {
+    pub(crate) fn contact_rate(&self) -> f32 {
+        let rate = self.largest_speed / (self.solver.contact_overlap * self.spacing);
+        (rate * rate) as f32
+    }
+
+    /// Spring constant and dashpot of one contact (E14): of a reduced mass (kg), shared by so many by shape and by count, at a
+    /// [`Model::contact_rate`], unless stated.
+    #[inline(always)]
+    pub(crate) fn contact_constants(mass: f32, ln_e: f32, share: [f32; 2], rate: f32, stated: [f32; 2]) -> (f32, f32) {
         use crate::laws::contact::{damping_ratio, dashpot};
-        let k = if stated_k > 0.0 {
-            stated_k
-        } else {
-            // all sharers together stop the mass at the scene's largest speed within the allowed overlap
-            let rate = self.largest_speed / (self.solver.contact_overlap * self.spacing);
-            mass * (rate * rate) as f32 / shared_by
-        };
-        let n = shared_by.max(counted);
-        let eta = if stated_eta >= 0.0 { stated_eta } else { dashpot(damping_ratio(ln_e), k * n, mass) / n };
-        (k, eta)
+        let given = mass * rate / share[0];
+        let k = if stated[0] > 0.0 { stated[0] } else { given };
+        let n = share[0].max(share[1]);
+        let dashpot = dashpot(damping_ratio(ln_e), k * n, mass) / n;
+        (k, if stated[1] >= 0.0 { stated[1] } else { dashpot })
     }
 
     /// Duration of a contact of body `a` with its like (s), when `sharers` contacts share the load.

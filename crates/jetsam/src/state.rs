@@ -83,7 +83,9 @@ impl Slips {
     /// The slip of the contact with a slot (m).
     #[inline(always)]
     pub fn of(&self, slot: u32) -> Option<[f32; 3]> {
-        (0..HELD_CONTACTS).find(|&k| self.with[k] == slot).map(|k| self.slip[k])
+        // all at once: where it stands is not to be foretold
+        let found = (0..HELD_CONTACTS).fold(0u32, |found, k| found | u32::from(self.with[k] == slot) << k);
+        if found == 0 { None } else { Some(self.slip[found.trailing_zeros() as usize % HELD_CONTACTS]) }
     }
 
     /// Whether there is no contact.

@@ -124,7 +124,7 @@ impl World {
         }
     }
 
-    fn on(mut backend: Box<dyn Backend>, assembly: Assembly) -> Self {
+    pub(crate) fn on(mut backend: Box<dyn Backend>, assembly: Assembly) -> Self {
         let Assembly { model, state, meshes } = assembly;
         backend.upload(&model, state);
         let mut world = Self {

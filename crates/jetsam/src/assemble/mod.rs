@@ -17,7 +17,7 @@ mod surface;
 use crate::error::Result;
 use crate::interact::cells::Grid;
 use crate::mesh::Mesh;
-use crate::model::{CONTACT_REACH, Model};
+use crate::model::{CONTACT_REACH, CONTACT_SKIN, Model};
 use crate::scene::{Density, Force, Scene, Shape, Wall};
 use crate::state::{Bodies, Body, Particles, Record, Slips, State, Touch};
 use bodies::NewBody;
@@ -55,7 +55,8 @@ impl Scene {
         let support = self.solver.support * spacing;
         let volume = spacing.powi(dimensions as i32);
         let layers = (self.solver.support - 1e-9).ceil().max(1.0);
-        let grid = self.grid(support.max(CONTACT_REACH * self.solver.contact_diameter * spacing), layers * spacing);
+        let contacts = (CONTACT_REACH + CONTACT_SKIN) * self.solver.contact_diameter * spacing;
+        let grid = self.grid(support.max(contacts), layers * spacing);
         self.check_memory(&grid)?;
 
         let mut bodies = self.rigid_bodies(&grid, volume, &mut warnings)?;
@@ -209,12 +210,13 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
             body.l = inertia_world * b.spin;
             body.l_half = body.l;
         }
+        let frame = crate::integrate::bodies::Frame::of(&body);
         for ((offset, volume), normal) in b.offset.into_iter().zip(b.particle_volume).zip(b.normal) {
             let mut record = Record { volume: volume as f32, ..Record::default() };
-            crate::integrate::bodies::place(&mut record, &body, offset, model);
+            frame.place(&mut record, offset, model);
             bodies.offset.push(offset);
             bodies.normal.push(normal);
-            bodies.facing.push(crate::integrate::bodies::face(&body, normal));
+            bodies.facing.push(frame.face(normal));
             bodies.owner.push(index as u32);
             bodies.record.push(record);
         }

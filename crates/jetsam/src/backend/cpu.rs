@@ -3,12 +3,13 @@
 //! Work is cut into chunks of fixed size whose results do not depend on who computes them, and sums over chunks
 //! are made in their order: the same bits for any number of threads.
 
+mod contacts;
 mod implicit;
 mod parts;
 
 use super::Backend;
 use crate::flock::{Crowd, Surroundings};
-use crate::integrate::sleep::{self, Rest};
+use crate::integrate::sleep;
 use crate::integrate::{Advance, bodies, joints, particles, sources};
 use crate::interact::cells::{Cells, Grid};
 use crate::interact::contacts::Surfaces;
@@ -19,7 +20,7 @@ use crate::ledger::Ledger;
 use crate::model::Model;
 use crate::scene::{Density, Pressure};
 use crate::stage::Stage;
-use crate::state::{Body, Kind, Record, Slips, State, Touch};
+use crate::state::{Body, Kind, Record, State};
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use implicit::Implicit;
@@ -46,17 +47,11 @@ pub struct Cpu {
     /// Summed densities where they are integrated; else empty.
     summed: Vec<f32>,
     parts: Vec<bodies::Part>,
-    /// Slips of contacts found by forces, chunk by chunk, of rigid and of static particles (none).
-    slips: [Vec<Vec<Slips>>; 2],
+    contacts: contacts::Contacts,
     particle_mass: Vec<f32>,
-    /// Angular velocity of each body (rad/s), for contacts.
-    spin: Vec<[f32; 3]>,
-    /// Which bodies sleep, what each is to those that touch it, and which were touched by what moves.
+    /// Which bodies sleep, and which were touched by what moves.
     asleep: Vec<bool>,
-    rest: Vec<Rest>,
     stirred: Vec<AtomicBool>,
-    /// Contacts that shared the load of each body.
-    sharers: Vec<f32>,
     sums: Vec<Ledger>,
     ledger: Ledger,
     static_copies: u32,
@@ -98,12 +93,9 @@ impl Default for Cpu {
             mirror: Vec::new(),
             summed: Vec::new(),
             parts: Vec::new(),
-            slips: Default::default(),
+            contacts: Default::default(),
             particle_mass: Vec::new(),
-            spin: Vec::new(),
-            sharers: Vec::new(),
             asleep: Vec::new(),
-            rest: Vec::new(),
             stirred: Vec::new(),
             sums: Vec::new(),
             ledger: Ledger::default(),
@@ -150,6 +142,7 @@ impl Backend for Cpu {
             next_id: p.next_id(),
             body_radius: bodies.body.iter().map(far).collect(),
             implicit: Implicit::of(bodies.body.len()),
+            contacts: self.contacts.anew(&state.bodies),
             state,
             ..Self::default()
         };
@@ -157,6 +150,7 @@ impl Backend for Cpu {
 
     fn edit(&mut self, _model: &Model, change: &mut dyn FnMut(&mut State)) {
         change(&mut self.state);
+        self.contacts.forget();
     }
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
@@ -170,14 +164,14 @@ impl Backend for Cpu {
             Stage::Pressure if solver == Pressure::Pbf => self.correct(model, advance),
             Stage::Drift => self.drift(model, advance),
             Stage::Sources => self.sources(model, advance),
-            Stage::Cells => self.sort(model),
+            Stage::Cells => self.sort(model, advance),
             Stage::Density => self.density(model),
             Stage::Pressure => self.pressure(model),
             Stage::Boundary => self.boundary(model, advance),
             Stage::Gradients => self.gradients(model),
             Stage::Forces => {
                 let part = Advance { dt: advance.part(), ..advance };
-                self.forces(model, part, &Kind::ALL);
+                self.forces(model, part);
                 let held = sources::hold(&mut self.state.particles, model);
                 self.held = held.force;
                 if model.implicit() {
@@ -210,24 +204,6 @@ macro_rules! chunks_mut {
     };
 }
 
-/// What is around particles; with `fluids` or for contacts alone. A macro, as its parts are borrowed one by one.
-macro_rules! around {
-    ($cpu:expr, $particles:expr, $model:expr, $fluids:expr) => {
-        Around {
-            grid: &$model.grid,
-            records: &$particles.record,
-            places: &$cpu.places,
-            owner: &$particles.owner,
-            cells: [&$cpu.cells[0], &$cpu.cells[1], &$cpu.cells[2]],
-            first: $particles.first,
-            asleep: &$cpu.asleep,
-            fluids: $fluids,
-            support: $model.support as f32,
-            contact_reach: $model.contact_reach() as f32,
-        }
-    };
-}
-
 impl Cpu {
     fn drift(&mut self, model: &Model, advance: Advance) {
         let State { particles: p, bodies: b, .. } = &mut self.state;
@@ -247,14 +223,7 @@ impl Cpu {
                 .for_each(|((density, rate), carry)| particles::predict(advance, density, rate, carry));
         }
         if advance.drag == 0.0 {
-            let paths = model.paths.par_iter().with_min_len(CHUNK);
-            b.body.par_iter_mut().zip(paths).for_each(|(body, path)| match path {
-                Some(path) => bodies::script(body, path, advance.end()),
-                None => bodies::half_kick(body, model, advance.dt),
-            });
-            joints::drift(b, model, advance.dt);
-            b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::drift(body, model, advance.dt));
-            bodies::follow(b, model);
+            bodies::advance(b, model, advance);
         }
     }
 
@@ -279,12 +248,26 @@ impl Cpu {
             self.places = Places::new(total);
             self.share.resize(total, 0.0);
             self.static_copies = 0;
+            self.contacts.forget();
         }
         sources::drain(p, model, advance.time + advance.dt);
     }
 
     /// Sorts every kind. Fluids change places for good; particles of bodies are copied from their slots.
-    fn sort(&mut self, model: &Model) {
+    fn sort(&mut self, model: &Model, advance: Advance) {
+        if !model.fluids.is_empty() {
+            self.sort_fluids(model);
+        }
+        self.sort_bodies(model, advance);
+        // static particles stay where they are: once into each half of the double buffer
+        if self.static_copies < 2 {
+            self.copy_bodies(&model.grid, Kind::Static);
+            self.cells[Kind::Static as usize].map(&model.grid);
+            self.static_copies += 1;
+        }
+    }
+
+    fn sort_fluids(&mut self, model: &Model) {
         let grid = &model.grid;
         let p = &mut self.state.particles;
         let from = &mut self.spare;
@@ -345,13 +328,6 @@ impl Cpu {
         let order = std::mem::take(&mut self.cells[Kind::Fluid as usize].order);
         self.sort_places(|k| order[k].load(Relaxed) as usize);
         self.cells[Kind::Fluid as usize].order = order;
-        self.copy_bodies(grid, Kind::Rigid);
-        // static particles stay where they are: once into each half of the double buffer
-        if self.static_copies < 2 {
-            self.copy_bodies(grid, Kind::Static);
-            self.cells[Kind::Static as usize].map(grid);
-            self.static_copies += 1;
-        }
     }
 
     /// Sorts the slots of a kind of body and copies them to their places.
@@ -389,7 +365,17 @@ impl Cpu {
 
     fn density(&mut self, model: &Model) {
         let p = &mut self.state.particles;
-        let around = around!(self, p, model, true);
+        let around = Around {
+            grid: &model.grid,
+            records: &p.record,
+            places: &self.places,
+            owner: &p.owner,
+            cells: self.cells.each_ref(),
+            first: p.first,
+            asleep: &self.asleep,
+            contacts: false,
+            reach: model.support as f32,
+        };
         let (n, level) = (p.count[Kind::Fluid as usize], self.level);
         self.slices.resize_with(n.div_ceil(CHUNK), Slices::default);
         let density = match model.solver.density {
@@ -403,28 +389,7 @@ impl Cpu {
                 dispatch!(level, simd => density::fluid_chunk(simd, scratch, model, around, members, slices, density));
             });
         });
-        self.find_bodies(model, &[Kind::Rigid, Kind::Static], true);
-    }
-
-    /// Neighbours of bodies' particles; without `fluids` their contacts alone.
-    fn find_bodies(&mut self, model: &Model, kinds: &[Kind], fluids: bool) {
-        self.asleep.clear();
-        self.asleep.extend(self.state.bodies.body.iter().map(|b| b.asleep));
-        let p = &self.state.particles;
-        let around = around!(self, p, model, fluids);
-        let level = self.level;
-        for &kind in kinds {
-            let segment = p.segment(kind);
-            let chunks = &mut self.neighbours[kind as usize];
-            chunks.resize_with(segment.len().div_ceil(CHUNK), NeighbourChunk::default);
-            chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
-                let first = segment.start + c * CHUNK;
-                let members = first..(first + CHUNK).min(segment.end);
-                with_scratch(|scratch| {
-                    dispatch!(level, simd => density::body_chunk(simd, scratch, around, kind, members, chunk));
-                });
-            });
-        }
+        self.find_bodies(model);
     }
 
     fn pressure(&mut self, model: &Model) {
@@ -449,6 +414,9 @@ impl Cpu {
         }
         if model.no_slip {
             self.mirror.resize(p.record.len(), [0.0; 4]);
+        }
+        if model.fluids.is_empty() {
+            return;
         }
         for kind in [Kind::Rigid, Kind::Static] {
             let segment = p.segment(kind);
@@ -492,66 +460,51 @@ impl Cpu {
         );
     }
 
-    fn forces(&mut self, model: &Model, advance: Advance, kinds: &[Kind]) {
+    /// Forces on fluids, then on bodies' particles.
+    fn forces(&mut self, model: &Model, advance: Advance) {
+        self.calm();
         let State { particles: p, bodies: b, .. } = &mut self.state;
-        let (records, owner, particle_mass, level) = (&p.record, &p.owner, &self.particle_mass, self.level);
-        self.spin.clear();
-        self.spin.extend(b.body.iter().map(|b| b.omega.as_vec3().to_array()));
-        self.sharers.clear();
-        self.sharers.extend(b.body.iter().map(|b| b.sharers));
-        self.rest.clear();
-        self.rest.extend(b.body.iter().map(sleep::rest));
-        self.stirred.iter_mut().for_each(|s| *s.get_mut() = false);
-        let (spin, sharers, rest, stirred) = (&self.spin, &self.sharers, &self.rest, &self.stirred);
-        let surfaces = Surfaces { slot: &p.id, facing: &b.facing, slips: &b.slips, sharers, rest, stirred, spin };
-        let gravity = model.gravity_at(advance.end()).as_vec3();
-        let bodies_first = p.first[Kind::Rigid as usize];
-        let (mirror, gradient) = (&self.mirror[..], &p.gradient[..]);
-        let (dt, fastest) = (advance.dt as f32, self.ledger.speed as f32);
-        let input = |first: usize| forces::Input {
-            model,
-            records,
-            mirror,
-            gradient,
-            owner,
-            first,
-            particle_mass,
-            surfaces,
-            gravity,
-            dt,
-            fastest,
+        let surfaces = Surfaces {
+            slot: &p.id,
+            kept: self.contacts.lists(),
+            record: &b.record,
+            owner: &b.owner,
+            facing: &b.facing,
+            slips: &b.slips,
+            held: &self.contacts.held,
+            solid: &self.contacts.solid,
+            stirred: &self.stirred,
+            reach: self.contacts.reach,
         };
-        for &kind in kinds {
-            let first = p.first[kind as usize];
-            let push = &mut p.push[first..first + p.count[kind as usize]];
-            if kind == Kind::Fluid {
-                // what nobody asks for is empty
-                let (mut carry, mut vorticity) = (p.carry.chunks_mut(CHUNK), p.vorticity.chunks_mut(CHUNK));
-                let out = push.chunks_mut(CHUNK).map(|push| forces::OnFluids {
-                    push,
-                    carry: carry.next().unwrap_or_default(),
-                    vorticity: vorticity.next().unwrap_or_default(),
-                });
-                let chunks = out.collect::<Vec<_>>().into_par_iter().zip(&self.slices).enumerate();
-                chunks.for_each(|(c, (out, slices))| {
-                    dispatch!(level, simd => forces::fluids(simd, input(first + c * CHUNK), slices, out));
-                });
-                continue;
-            }
-            let touch = p.touch[first - bodies_first..].par_chunks_mut(CHUNK);
-            // what stands remembers nothing
-            let slips = &mut self.slips[usize::from(kind == Kind::Static)];
-            slips.resize_with(p.count[kind as usize].div_ceil(CHUNK), Vec::new);
-            let chunks =
-                push.par_chunks_mut(CHUNK).zip(&self.neighbours[kind as usize]).zip(touch).zip(slips).enumerate();
-            chunks.for_each(|(c, (((push, chunk), touch), slips))| {
-                if !chunk.found && kind == Kind::Static {
-                    touch.fill(Touch::default());
-                    return push.fill([0.0; 3]);
-                }
-                let out = forces::OnBodies { push, touch, slips };
-                dispatch!(level, simd => forces::bodies(simd, input(first + c * CHUNK), kind, chunk, out));
-            });
+        let input = forces::Input {
+            model,
+            records: &p.record,
+            mirror: &self.mirror,
+            gradient: &p.gradient,
+            owner: &p.owner,
+            first: 0,
+            particle_mass: &self.particle_mass,
+            surfaces,
+            gravity: model.gravity_at(advance.end()).as_vec3(),
+            dt: advance.dt as f32,
+            fastest: self.ledger.speed as f32,
+        };
+        let level = self.level;
+        let push = &mut p.push[..p.count[Kind::Fluid as usize]];
+        // what nobody asks for is empty
+        let (mut carry, mut vorticity) = (p.carry.chunks_mut(CHUNK), p.vorticity.chunks_mut(CHUNK));
+        let out = push.chunks_mut(CHUNK).map(|push| forces::OnFluids {
+            push,
+            carry: carry.next().unwrap_or_default(),
+            vorticity: vorticity.next().unwrap_or_default(),
+        });
+        let chunks = out.collect::<Vec<_>>().into_par_iter().zip(&self.slices).enumerate();
+        chunks.for_each(|(c, (out, slices))| {
+            let input = forces::Input { first: c * CHUNK, ..input };
+            dispatch!(level, simd => forces::fluids(simd, input, slices, out));
+        });
+        for kind in [Kind::Rigid, Kind::Static] {
+            self.push_slots(model, advance, kind, true);
         }
     }
 
@@ -564,43 +517,8 @@ impl Cpu {
         self.ledger.nonfinite += self.crowd.nonfinite as u64;
     }
 
-    /// Sums what the particles of bodies feel; unless `all`, of rigid ones alone.
-    fn bodies(&mut self, model: &Model, advance: Advance, all: bool) {
-        let State { particles: p, bodies: b, .. } = &mut self.state;
-        let (place, push, touch, first) = (&self.place, &p.push, &p.touch, p.first[Kind::Rigid as usize]);
-        let felt = |slot: usize| match place[slot].load(Relaxed) {
-            GONE => None,
-            at => Some((&push[at as usize], &touch[at as usize - first])),
-        };
-        let before: Vec<bool> = b.body.iter().map(|b| b.deep).collect();
-        let slots = 0..if all { b.record.len() } else { b.rigid_slots };
-        bodies::sum(b, &mut self.parts, slots, felt, model.gravity_at(advance.end()), model.dimensions);
-        joints::springs(b, model);
-        for (body, before) in b.body.iter_mut().zip(before) {
-            let far = body.contacts > 0 && body.v.length() * advance.dt > 0.5 * model.contact_diameter;
-            body.deep |= far && !body.is_static();
-            self.ledger.fast_contacts += u64::from(body.deep && !before && !body.is_static());
-        }
-        if !b.slips.is_empty() {
-            let rigid = &p.touch[..p.count[Kind::Rigid as usize]];
-            self.ledger.forgotten_slips += rigid.par_iter().map(|t| u64::from(t.forgotten)).sum::<u64>();
-        }
-        let found = &self.slips[0];
-        b.slips.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(slot, slips)| {
-            if b.body[b.owner[slot] as usize].asleep {
-                return;
-            }
-            let at = place[slot].load(Relaxed) as usize;
-            match felt(slot).map_or(0, |(_, touch)| touch.slips) {
-                0 if slips.is_empty() => {}
-                0 => *slips = Slips::default(),
-                own => *slips = found[(at - first) / CHUNK][own as usize - 1],
-            }
-        });
-    }
-
     fn kick(&mut self, model: &Model, advance: Advance) {
-        let State { particles: p, bodies: b, .. } = &mut self.state;
+        let State { particles: p, .. } = &mut self.state;
         let integrator = model.solver.integrator;
         let fluid = p.segment(Kind::Fluid);
         chunks_mut!(p.record, fluid.clone())
@@ -617,13 +535,31 @@ impl Cpu {
                 .for_each(|((density, rate), carry)| particles::correct(advance, density, rate, carry));
         }
         if advance.drag == 0.0 {
-            b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::kick(body, integrator, advance.dt));
-            joints::kick(b, model);
-            if sleep::possible(model) {
-                for (body, (stirred, contact)) in b.body.iter_mut().zip(self.stirred.iter_mut().zip(&model.contacts)) {
-                    sleep::update(body, model, contact.jointed, *stirred.get_mut(), advance.dt);
-                }
+            self.kick_bodies(model, advance.dt);
+        }
+    }
+
+    /// The second half of the kick, joints, and who falls asleep or wakes up.
+    fn kick_bodies(&mut self, model: &Model, dt: f64) {
+        let b = &mut self.state.bodies;
+        let (integrator, sleeps) = (model.solver.integrator, sleep::possible(model));
+        let kick = |body: &mut Body| bodies::kick(body, integrator, dt);
+        let doze = |body: &mut Body, jointed: bool, stirred: &mut AtomicBool| {
+            if sleeps {
+                sleep::update(body, model, jointed, *stirred.get_mut(), dt);
             }
+        };
+        if model.joints.is_empty() {
+            let all = b.body.par_iter_mut().zip(&mut self.stirred).with_min_len(64);
+            return all.for_each(|(body, stirred)| {
+                kick(body);
+                doze(body, false, stirred);
+            });
+        }
+        b.body.par_iter_mut().with_min_len(64).for_each(kick);
+        joints::kick(b, model);
+        for (body, (stirred, contact)) in b.body.iter_mut().zip(self.stirred.iter_mut().zip(&model.contacts)) {
+            doze(body, contact.jointed, stirred);
         }
     }
 
@@ -696,24 +632,16 @@ impl Cpu {
             total.total_force -= *added;
             total.force_scale += added.length();
         }
-        for body in &b.body {
-            if body.is_static() {
-                total.external_force -= body.force;
-                continue;
-            }
-            total.momentum += body.mass * body.v;
-            total.momentum_scale += body.mass * body.v.length();
-            total.external_force += body.mass * gravity;
-            if body.one_way {
-                total.external_force -= body.force_fluid;
-            }
-            total.total_force += body.force;
-            total.kinetic += 0.5 * (body.mass * body.v.length_squared() + body.l.dot(body.omega));
-            total.potential -= body.mass * model.gravity.dot(body.x - model.grid.min);
-            total.force_scale += body.force.length();
-            if !(body.x.is_finite() && body.v.is_finite() && body.l.is_finite()) {
-                total.nonfinite += 1;
-            }
+        let of_bodies: Vec<Ledger> = b.body.par_chunks(CHUNK).map(|part| tally_bodies(model, part, gravity)).collect();
+        for s in &of_bodies {
+            total.momentum += s.momentum;
+            total.momentum_scale += s.momentum_scale;
+            total.external_force += s.external_force;
+            total.total_force += s.total_force;
+            total.force_scale += s.force_scale;
+            total.kinetic += s.kinetic;
+            total.potential += s.potential;
+            total.nonfinite += s.nonfinite;
         }
         for flock in &model.flocks {
             let Some(matter) = &flock.matter else { continue };
@@ -728,8 +656,9 @@ impl Cpu {
             }
         }
         total.external_force += self.fields_on_bodies(model);
-        let speeds = b.record[..b.rigid_slots].iter().map(|r| f64::from(glam::Vec3::from(r.v).length()));
-        total.body_speed = speeds.fold(0.0, f64::max);
+        let speeds = b.record[..b.rigid_slots].par_iter().with_min_len(CHUNK);
+        let fastest = speeds.map(|r| glam::Vec3::from(r.v).length_squared()).reduce(|| 0.0, f32::max);
+        total.body_speed = f64::from(fastest.sqrt());
         total.speed = total.speed.max(total.body_speed);
         self.ledger = total;
     }
@@ -756,6 +685,31 @@ impl Cpu {
         let outside = |slot: &usize| self.place[*slot].load(Relaxed) == GONE;
         (0..b.rigid_slots).filter(|&slot| !model.moves(b.owner[slot])).filter(outside).count()
     }
+}
+
+/// What the ledger says of some bodies.
+fn tally_bodies(model: &Model, bodies: &[Body], gravity: DVec3) -> Ledger {
+    let mut total = Ledger::default();
+    for body in bodies {
+        if body.is_static() {
+            total.external_force -= body.force;
+            continue;
+        }
+        total.momentum += body.mass * body.v;
+        total.momentum_scale += body.mass * body.v.length();
+        total.external_force += body.mass * gravity;
+        if body.one_way {
+            total.external_force -= body.force_fluid;
+        }
+        total.total_force += body.force;
+        total.kinetic += 0.5 * (body.mass * body.v.length_squared() + body.l.dot(body.omega));
+        total.potential -= body.mass * model.gravity.dot(body.x - model.grid.min);
+        total.force_scale += body.force.length();
+        if !(body.x.is_finite() && body.v.is_finite() && body.l.is_finite()) {
+            total.nonfinite += 1;
+        }
+    }
+    total
 }
 
 /// What the ledger reads of one chunk.

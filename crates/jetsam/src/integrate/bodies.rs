@@ -1,10 +1,11 @@
 //! Rigid bodies: the sum of forces and torques (E18), drift and kick (E20), and particles that follow (E21).
 
+use super::{Advance, joints};
 use crate::model::Model;
 use crate::scene::Integrator;
 use crate::scene::motion::Path;
 use crate::state::{Bodies, Body, Record, Touch};
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -12,6 +13,8 @@ use std::ops::Range;
 const PART: usize = 1024;
 /// Rounds of the implicit midpoint rule: it converges by a factor `omega dt` a round.
 const ROUNDS: usize = 6;
+/// It has converged when a round turns by no more than this (rad).
+const SETTLED: f64 = 1e-17;
 
 /// Length of the kick before the drift (s).
 pub(crate) fn first_kick(integrator: Integrator, dt: f64) -> f64 {
@@ -19,6 +22,26 @@ pub(crate) fn first_kick(integrator: Integrator, dt: f64) -> f64 {
         Integrator::Leapfrog => 0.5 * dt,
         Integrator::Euler => dt,
     }
+}
+
+/// E15 and E20, first half: scripts, half a kick, joints, drift, and particles that follow.
+pub fn advance(bodies: &mut Bodies, model: &Model, advance: Advance) {
+    let kick = |body: &mut Body, path: &Option<Path>| match path {
+        Some(path) => script(body, path, advance.end()),
+        None => half_kick(body, model, advance.dt),
+    };
+    let each = bodies.body.par_iter_mut().zip(&model.paths).with_min_len(64);
+    if model.joints.is_empty() {
+        each.for_each(|(body, path)| {
+            kick(body, path);
+            drift(body, model, advance.dt);
+        });
+    } else {
+        each.for_each(|(body, path)| kick(body, path));
+        joints::drift(bodies, model, advance.dt);
+        bodies.body.par_iter_mut().with_min_len(64).for_each(|body| drift(body, model, advance.dt));
+    }
+    follow(bodies, model);
 }
 
 /// E20, first half: half a kick.
@@ -43,7 +66,7 @@ pub fn drift(body: &mut Body, model: &Model, dt: f64) {
     let rest = dt - kick;
     body.v = body.v_half + rest * acceleration;
     body.l = body.l_half + rest * body.torque;
-    body.omega = body.inverse_inertia_at(body.q) * body.l;
+    body.omega = spin(body, body.q, body.l);
     for a in 0..3 {
         let period = f64::from(model.grid.period[a]);
         if period > 0.0 {
@@ -56,13 +79,43 @@ pub fn drift(body: &mut Body, model: &Model, dt: f64) {
 /// Orientation after a free turn of `dt` with constant angular momentum: implicit midpoint rule, symmetric in
 /// time and of second order, so that energy does not drift.
 pub(super) fn turned(body: &Body, l: DVec3, dt: f64) -> DQuat {
-    let mut middle = body.q;
-    for _ in 0..ROUNDS {
-        let omega = body.inverse_inertia_at(middle) * l;
-        middle = DQuat::from_scaled_axis(0.5 * dt * omega) * body.q;
+    let mut omega = spin(body, body.q, l);
+    for _ in 0..if round(body).is_some() { 0 } else { ROUNDS } {
+        let next = spin(body, turn(0.5 * dt * omega) * body.q, l);
+        let change = dt * (next - omega);
+        omega = next;
+        if change.length_squared() < SETTLED * SETTLED {
+            break;
+        }
     }
-    let omega = body.inverse_inertia_at(middle) * l;
-    (DQuat::from_scaled_axis(dt * omega) * body.q).normalize()
+    (turn(dt * omega) * body.q).normalize()
+}
+
+/// Angular velocity (rad/s) for the orientation `q` and angular momentum `l`.
+fn spin(body: &Body, q: DQuat, l: DVec3) -> DVec3 {
+    if let Some(inverse) = round(body) {
+        return inverse * l;
+    }
+    let r = DMat3::from_quat(q);
+    r * (body.inverse_inertia * (r.transpose() * l))
+}
+
+/// The inverse of the moment of inertia, if it is the same about all axes: balls and cubes.
+fn round(body: &Body) -> Option<f64> {
+    let inverse = body.inverse_inertia.x_axis.x;
+    (body.inverse_inertia == DMat3::from_diagonal(DVec3::splat(inverse))).then_some(inverse)
+}
+
+/// The turn by a vector (rad); small ones by their series, exact to the last bit but one.
+fn turn(by: DVec3) -> DQuat {
+    let square = 0.25 * by.length_squared();
+    if square > 1e-3 {
+        return DQuat::from_scaled_axis(by);
+    }
+    let sine = 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)));
+    let cosine = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)));
+    let axis = 0.5 * sine * by;
+    DQuat::from_xyzw(axis.x, axis.y, axis.z, cosine)
 }
 
 /// E20, second half: the kick with the new force.
@@ -72,27 +125,67 @@ pub fn kick(body: &mut Body, integrator: Integrator, dt: f64) {
     }
     body.v = body.v_half + 0.5 * dt / body.mass * body.force;
     body.l = body.l_half + 0.5 * dt * body.torque;
-    body.omega = body.inverse_inertia_at(body.q) * body.l;
+    body.omega = spin(body, body.q, body.l);
 }
 
 /// E21: the slots of rigid bodies take the place and velocity their body gives them.
 pub fn follow(bodies: &mut Bodies, model: &Model) {
     let Bodies { body, offset, owner, record, normal, facing, rigid_slots, .. } = bodies;
-    let slots = offset.par_iter().zip(&*owner).zip(&*normal).with_min_len(PART);
-    let out = record[..*rigid_slots].par_iter_mut().zip(facing);
-    out.zip(slots).for_each(|((record, facing), ((offset, &owner), normal))| {
-        let body = &body[owner as usize];
-        place(record, body, *offset, model);
-        *facing = face(body, *normal);
+    let given = offset.par_chunks(PART).zip(owner.par_chunks(PART)).zip(normal.par_chunks(PART));
+    let taken = record[..*rigid_slots].par_chunks_mut(PART).zip(facing.par_chunks_mut(PART));
+    taken.zip(given).for_each(|((record, facing), ((offset, owner), normal))| {
+        let mut k = 0;
+        while k < record.len() {
+            let same = owner[k..record.len()].iter().take_while(|&&o| o == owner[k]).count();
+            let frame = Frame::of(&body[owner[k] as usize]);
+            let run = k..k + same;
+            for (record, offset) in record[run.clone()].iter_mut().zip(&offset[run.clone()]) {
+                frame.place(record, *offset, model);
+            }
+            for (facing, normal) in facing[run.clone()].iter_mut().zip(&normal[run]) {
+                *facing = frame.face(*normal);
+            }
+            k += same;
+        }
     });
 }
 
-/// Outward normal of a slot in world axes.
-pub fn face(body: &Body, normal: [f32; 3]) -> [f32; 3] {
-    if normal == [0.0; 3] {
-        return normal;
+/// What a body gives its particles.
+pub struct Frame {
+    x: DVec3,
+    v: DVec3,
+    /// From the body's axes to those of the world, and to velocities by its spin (1/s).
+    axes: DMat3,
+    swing: DMat3,
+    normals: Mat3,
+}
+
+impl Frame {
+    /// That of a body as it is now.
+    pub fn of(body: &Body) -> Self {
+        let axes = DMat3::from_quat(body.q);
+        let swing = DMat3::from_cols(
+            body.omega.cross(axes.x_axis),
+            body.omega.cross(axes.y_axis),
+            body.omega.cross(axes.z_axis),
+        );
+        Self { x: body.x, v: body.v, axes, swing, normals: axes.as_mat3() }
     }
-    (body.q.as_quat() * Vec3::from(normal)).to_array()
+
+    /// E21 for one particle.
+    #[inline]
+    pub fn place(&self, record: &mut Record, offset: DVec3, model: &Model) {
+        let mut x = (self.x + self.axes * offset).as_vec3().to_array();
+        model.grid.wrap(&mut x);
+        record.x = x;
+        record.v = (self.v + self.swing * offset).as_vec3().to_array();
+    }
+
+    /// Outward normal of a slot in world axes.
+    #[inline]
+    pub fn face(&self, normal: [f32; 3]) -> [f32; 3] {
+        if normal == [0.0; 3] { normal } else { (self.normals * Vec3::from(normal)).to_array() }
+    }
 }
 
 /// E15: a body that follows a script, at a time (s).
@@ -100,15 +193,6 @@ pub fn script(body: &mut Body, path: &Path, time: f64) {
     let pose = path.at(time);
     (body.x, body.q, body.v, body.omega) = (pose.x, pose.q, pose.v, pose.omega);
     (body.acceleration, body.angular_acceleration) = (pose.a, pose.alpha);
-}
-
-/// E21 for one particle.
-pub fn place(record: &mut Record, body: &Body, offset: DVec3, model: &Model) {
-    let arm = body.q * offset;
-    let mut x = (body.x + arm).as_vec3().to_array();
-    model.grid.wrap(&mut x);
-    record.x = x;
-    record.v = (body.v + body.omega.cross(arm)).as_vec3().to_array();
 }
 
 /// Slots of one body that one task sums (E18).
@@ -129,13 +213,51 @@ struct Sum {
     deep: u32,
 }
 
-/// Cuts the slots of all bodies into parts: a huge body and many small ones spread alike over threads.
+impl Sum {
+    fn add(&mut self, other: &Self) {
+        for k in 0..3 {
+            self.force[k] += other.force[k];
+            self.torque[k] += other.torque[k];
+        }
+        self.contacts += other.contacts;
+        self.sharers += other.sharers;
+        self.deep += other.deep;
+    }
+}
+
+/// Cuts the slots of bodies that have many into parts: a huge body and many small ones spread alike over threads.
 pub fn parts(bodies: &[Body]) -> Vec<Part> {
     let cut = |(body, b): (usize, &Body)| {
         let (slots, sum) = (b.slots.clone(), Sum::default());
         slots.clone().step_by(PART).map(move |s| Part { body, slots: s..(s + PART).min(slots.end), sum })
     };
-    bodies.iter().enumerate().flat_map(cut).collect()
+    bodies.iter().enumerate().filter(|(_, b)| b.slots.len() > PART).flat_map(cut).collect()
+}
+
+/// Sums over the slots of bodies, in their order.
+struct Sums<'a, F> {
+    parts: &'a [Part],
+    of: F,
+}
+
+impl<'a, F: Fn(&Body, Range<usize>) -> Sum + Sync> Sums<'a, F> {
+    /// Sums the parts of big bodies that have slots in a range.
+    fn new(bodies: &[Body], parts: &'a mut [Part], slots: &Range<usize>, of: F) -> Self {
+        let within = |part: &&mut Part| slots.contains(&part.slots.start);
+        parts.par_iter_mut().filter(within).for_each(|part| part.sum = of(&bodies[part.body], part.slots.clone()));
+        Self { parts, of }
+    }
+
+    /// The sum over body number `k`.
+    fn over(&self, k: usize, body: &Body) -> Sum {
+        if body.slots.len() <= PART {
+            return (self.of)(body, body.slots.clone());
+        }
+        let first = self.parts.partition_point(|part| part.body < k);
+        let mut sum = Sum::default();
+        self.parts[first..].iter().take_while(|part| part.body == k).for_each(|part| sum.add(&part.sum));
+        sum
+    }
 }
 
 /// E18 for one force alone: force and torque of the bodies that have slots in a range, in the order of slots; `thrust` has a
@@ -149,30 +271,26 @@ pub fn thrust<'a>(
     thrust: &mut [[DVec3; 2]],
 ) {
     let (body, offset) = (&bodies.body, &bodies.offset);
-    let within = |part: &&mut Part| slots.contains(&part.slots.start);
-    parts.par_iter_mut().filter(within).for_each(|part| {
-        let q = body[part.body].q;
+    let sums = Sums::new(body, parts, &slots, |body, slots| {
         let mut sum = Sum::default();
-        for slot in part.slots.clone() {
+        for slot in slots {
             let Some(f) = felt(slot).filter(|f| **f != [0.0; 3]) else { continue };
             let f = DVec3::from(f.map(f64::from));
             sum.force[0] += f;
-            sum.torque[0] += (q * offset[slot]).cross(f);
+            sum.torque[0] += (body.q * offset[slot]).cross(f);
         }
-        part.sum = sum;
+        sum
     });
-    for part in parts.iter().filter(|part| slots.contains(&part.slots.start)) {
-        let thrust = &mut thrust[part.body];
-        if part.slots.start == body[part.body].slots.start {
-            *thrust = [DVec3::ZERO; 2];
+    body.par_iter().zip(thrust).with_min_len(16).enumerate().for_each(|(k, (body, thrust))| {
+        if slots.contains(&body.slots.start) {
+            let Sum { force: [force, ..], torque: [torque, ..], .. } = sums.over(k, body);
+            *thrust = [force, if dimensions == 2 { DVec3::Y * torque.y } else { torque }];
         }
-        let [force, torque] = [part.sum.force[0], part.sum.torque[0]];
-        *thrust = [thrust[0] + force, thrust[1] + if dimensions == 2 { DVec3::Y * torque.y } else { torque }];
-    }
+    });
 }
 
 /// E18: force and torque of every body that has slots in a range from what they feel, in the order of slots; gravity (m/s^2) is added to
-/// the whole body.
+/// the whole body. `after` is given each of these bodies, and whether it was [`Body::deep`] before; what it returns is added.
 pub fn sum<'a>(
     bodies: &mut Bodies,
     parts: &mut [Part],
@@ -180,16 +298,16 @@ pub fn sum<'a>(
     felt: impl Fn(usize) -> Option<(&'a [f32; 3], &'a Touch)> + Sync,
     gravity: DVec3,
     dimensions: u32,
-) {
-    let (body, offset) = (&bodies.body, &bodies.offset);
+    after: impl Fn(&mut Body, bool) -> u64 + Sync,
+) -> u64 {
+    let offset = &bodies.offset;
     let double = |f: [f32; 3]| DVec3::from(f.map(f64::from));
-    let within = |part: &&mut Part| slots.contains(&part.slots.start);
-    parts.par_iter_mut().filter(within).for_each(|part| {
-        let q = body[part.body].q;
+    let sums = Sums::new(&bodies.body, parts, &slots, |body, slots| {
+        let axes = DMat3::from_quat(body.q);
         let mut sum = Sum::default();
-        for slot in part.slots.clone() {
+        for slot in slots {
             let Some((push, touch)) = felt(slot) else { continue };
-            let arm = q * offset[slot];
+            let arm = axes * offset[slot];
             for (k, f) in [*push, touch.fluid, touch.contact].into_iter().map(double).enumerate() {
                 sum.force[k] += f;
                 sum.torque[k] += arm.cross(f);
@@ -200,24 +318,15 @@ pub fn sum<'a>(
             sum.sharers += f64::from(touch.sharers);
             sum.deep += touch.deep;
         }
-        part.sum = sum;
+        sum
     });
-    let mut total = vec![Sum::default(); bodies.body.len()];
-    for part in parts.iter().filter(|part| slots.contains(&part.slots.start)) {
-        let (to, from) = (&mut total[part.body], &part.sum);
-        for k in 0..3 {
-            to.force[k] += from.force[k];
-            to.torque[k] += from.torque[k];
-        }
-        to.contacts += from.contacts;
-        to.sharers += from.sharers;
-        to.deep += from.deep;
-    }
-    for (body, mut sum) in bodies.body.iter_mut().zip(total) {
+    let each = bodies.body.par_iter_mut().with_min_len(64).enumerate().map(|(k, body)| {
+        let before = body.deep;
         // what it felt last still holds one that sleeps
         if body.asleep || !slots.contains(&body.slots.start) {
-            continue;
+            return after(body, before);
         }
+        let mut sum = sums.over(k, body);
         if dimensions == 2 {
             sum.torque = sum.torque.map(|t| DVec3::new(0.0, t.y, 0.0));
         }
@@ -233,5 +342,7 @@ pub fn sum<'a>(
         }
         body.contacts = sum.contacts;
         body.deep = sum.deep > 0;
-    }
+        after(body, before)
+    });
+    each.sum()
 }

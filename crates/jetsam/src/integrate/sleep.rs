@@ -9,9 +9,10 @@ use crate::state::Body;
 use glam::DVec3;
 
 /// What a body is to those that touch it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rest {
     /// It moves: it wakes what it touches. Whoever wakes is not restless before it moves, or waking would go round a pile.
+    #[default]
     Restless,
     /// It is still, or stands for good.
     Drowsy,

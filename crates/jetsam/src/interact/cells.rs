@@ -128,6 +128,22 @@ impl Grid {
         }
     }
 
+    /// A difference of places across periodic axes, the short way (m).
+    pub fn nearest(&self, mut d: DVec3) -> DVec3 {
+        for a in 0..3 {
+            let period = f64::from(self.period[a]);
+            if period > 0.0 {
+                d[a] -= period * (d[a] / period).round();
+            }
+        }
+        d
+    }
+
+    /// Whether a particle at `x` is part of the simulation.
+    pub fn holds(&self, x: [f32; 3]) -> bool {
+        self.gone(x) == 0
+    }
+
     /// Why a particle at `x` is no longer part of the simulation; 0 if it is.
     #[inline(always)]
     fn gone(&self, x: [f32; 3]) -> u32 {

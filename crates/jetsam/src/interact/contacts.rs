@@ -1,34 +1,83 @@
 //! Contacts of particles of different bodies (E10-E13), seen from one of them; called by the stage `forces`.
 //!
-//! In: the neighbours of a body's particle, surface normals, slips of contacts, spins. Out: a [`Touch`]: force, the couple
-//! of forces that act where two particles touch, what was counted; and [`Slips`], what friction remembers of each contact.
+//! In: the lists of slots that may touch, surface normals, slips of contacts, what contacts know of bodies. Out: a [`Touch`]
+//! for each particle: force, the couple of forces that act where two particles touch, what was counted; and [`Slips`], what
+//! friction remembers of each contact.
+//!
+//! Those of a list that come near enough are gathered, sixteen pairs of whatever particles at a time, and the laws are worked
+//! out in lanes; what comes out is added particle by particle, in the order of lists.
 
 use super::forces::Input;
+use super::kept::{FACED, Kept, Reach};
+use super::lanes::{LANES, Lanes};
 use super::pairs::wrap;
-use crate::integrate::sleep::Rest;
+use crate::integrate::sleep::{self, Rest};
 use crate::laws::contact;
+use crate::model::{ContactModel, Model, TANGENTIAL, TANGENTIAL_DAMPING};
 use crate::scene::{Damping, Surface};
-use crate::state::{HELD_CONTACTS, Slips, Touch};
+use crate::state::{Body, HELD_CONTACTS, Record, Slips, Touch};
+use fearless_simd::Simd;
 use glam::Vec3;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// What contacts know of bodies besides their particles' records.
+/// What contacts know of a body.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Solid {
+    inverse_mass: f32,
+    ln_restitution: f32,
+    shared_by: f32,
+    face: f32,
+    friction: f32,
+    stiffness: f32,
+    damping: f32,
+    /// Contacts that shared the load at the last step.
+    sharers: f32,
+    /// Angular velocity (rad/s).
+    spin: Vec3,
+    rest: Rest,
+}
+
+impl Solid {
+    /// What they know of a body as it moves now.
+    pub fn of(body: &Body, contact: &ContactModel) -> Self {
+        Self {
+            inverse_mass: contact.inverse_mass,
+            ln_restitution: contact.ln_restitution,
+            shared_by: contact.shared_by,
+            face: contact.face,
+            friction: contact.friction,
+            stiffness: contact.stiffness,
+            damping: contact.damping,
+            sharers: body.sharers,
+            spin: body.omega.as_vec3(),
+            rest: sleep::rest(body),
+        }
+    }
+}
+
+/// What contacts read.
 #[derive(Clone, Copy)]
 pub struct Surfaces<'a> {
     /// Slot of each particle of a body, by particle.
     pub slot: &'a [u32],
+    /// Slots that may touch.
+    pub kept: &'a Kept,
+    /// What particles show to pairs, by slot.
+    pub record: &'a [Record],
+    /// Body of each slot.
+    pub owner: &'a [u32],
     /// Outward normals in world axes, by slot: see [`crate::state::Bodies::facing`].
     pub facing: &'a [[f32; 3]],
     /// Slips of contacts, by slot of rigid bodies; empty where no body rubs.
     pub slips: &'a [Slips],
-    /// Contacts that shared the load at the last step, by body.
-    pub sharers: &'a [f32],
-    /// Whether each body moves, is still, or sleeps.
-    pub rest: &'a [Rest],
+    /// Whether there are any, slot by slot.
+    pub held: &'a [bool],
+    /// Bodies.
+    pub solid: &'a [Solid],
     /// Set for bodies that something restless touches.
     pub stirred: &'a [AtomicBool],
-    /// Angular velocities (rad/s), by body.
-    pub spin: &'a [[f32; 3]],
+    /// Pairs farther apart neither touch nor meet in half a step.
+    pub reach: Reach,
 }
 
 impl Surfaces<'_> {
@@ -36,7 +85,7 @@ impl Surfaces<'_> {
     #[inline(always)]
     fn stir(&self, a: u32, b: u32) {
         for (one, other) in [(a as usize, b as usize), (b as usize, a as usize)] {
-            if self.rest[one] == Rest::Restless && self.rest[other] != Rest::Restless {
+            if self.solid[one].rest == Rest::Restless && self.solid[other].rest != Rest::Restless {
                 self.stirred[other].store(true, Relaxed);
             }
         }
@@ -48,15 +97,19 @@ impl Surfaces<'_> {
         pair.slot[0] < pair.slot[1] || self.asleep(pair.body[1])
     }
 
+    /// Whether a body sleeps.
     #[inline(always)]
-    fn asleep(&self, body: u32) -> bool {
-        self.rest[body as usize] == Rest::Asleep
+    pub fn asleep(&self, body: u32) -> bool {
+        self.solid[body as usize].rest == Rest::Asleep
     }
 
     /// The slip of a contact up to now (m), seen from the first of the pair: the exact opposite of what the other sees.
     #[inline(always)]
     fn slip(&self, pair: Pair) -> [f32; 3] {
-        let of = |one: usize, other: usize| self.slips.get(one).and_then(|s| s.of(other as u32));
+        let of = |one: usize, other: usize| match self.held.get(one) {
+            Some(true) => self.slips[one].of(other as u32),
+            _ => None,
+        };
         let [own, other] = pair.slot;
         let mine = if self.keeps(pair) { of(own, other) } else { None };
         let theirs = || of(other, own).filter(|_| own > other || self.asleep(pair.body[1])).map(|s| s.map(|x| -x));
@@ -77,93 +130,289 @@ pub(crate) const DEEP: f32 = 0.5;
 /// It is stopped if its kinetic energy is so many times what the springs may still take.
 pub(crate) const HELD: f32 = 1.05;
 
-/// Adds the contacts with the particles in `list` to `touch`; `friction` remembers their slips.
+/// Pairs of one particle looked at together.
+const NEAR: usize = 32;
+
+/// Contacts of the particles from `input.first` on that may touch any, and the slips of those that rub; [`Touch::slips`] tells whose.
 #[inline(always)]
-pub fn add(input: &Input, i: usize, list: &[u32], touch: &mut Touch, friction: &mut Friction) {
+pub fn chunk<S: Simd>(_simd: S, input: &Input, touch: &mut [Touch], slips: &mut Vec<Slips>) {
+    match (input.model.solver.surface == Surface::Smooth, input.model.solver.damping == Damping::Full) {
+        (true, false) => particles::<true, false>(input, touch, slips),
+        (false, false) => particles::<false, false>(input, touch, slips),
+        (true, true) => particles::<true, true>(input, touch, slips),
+        (false, true) => particles::<false, true>(input, touch, slips),
+    }
+}
+
+#[inline(always)]
+fn particles<const SMOOTH: bool, const FULL: bool>(input: &Input, touch: &mut [Touch], slips: &mut Vec<Slips>) {
     let (model, surfaces) = (input.model, &input.surfaces);
-    let own = &input.records[i];
-    let owner = input.owner[i];
-    let diameter = model.contact_diameter as f32;
-    let full = model.solver.damping == Damping::Full;
-    let smooth = model.solver.surface == Surface::Smooth;
-    // farther than any pair that touches or meets in half a step
-    let reach = if smooth { (1.5 * diameter).hypot(model.spacing as f32) } else { 1.5 * diameter };
-    let slot = surfaces.slot[i] as usize;
-    for &j in list {
-        let other = &input.records[j as usize];
-        let d = wrap(model, Vec3::from(other.x) - Vec3::from(own.x));
-        let r = d.length();
-        if r >= reach {
+    slips.clear();
+    let [balls, faces] = [surfaces.reach.balls, surfaces.reach.faces].map(|reach| (reach * reach) as f32);
+    let mut batch = Batch::default();
+    let mut friction = Friction::default();
+    for k in 0..touch.len() {
+        let slot = surfaces.slot[input.first + k] as usize;
+        if !surfaces.kept.busy(slot) {
             continue;
         }
-        let body = input.owner[j as usize];
-        if model.apart(owner, body) {
+        touch[k] = Touch::default();
+        // what sleeps feels nothing new
+        if surfaces.asleep(surfaces.owner[slot]) {
             continue;
         }
-        let other_slot = surfaces.slot[j as usize] as usize;
-        let (mut n, mut along, mut s, mut part) = (d * (1.0 / r.max(1e-12)), d, r, 1.0);
-        let (a, b) = (surfaces.facing[slot], surfaces.facing[other_slot]);
-        // where they touch, seen from i: midway, or where a ball stands on a face
-        let mut arm = 0.5 * d;
-        if smooth && (a, b) != ([0.0; 3], [0.0; 3]) {
-            let normal = contact::contact_normal(d.to_array(), r, a, b);
-            let normal = Vec3::new(normal.x, normal.y, normal.z);
-            if normal != n {
-                (n, s) = (normal, d.dot(normal));
-                along = n * s;
-                part = contact::contact_part((d - along).length() / model.spacing as f32);
-                if b == [0.0; 3] {
-                    arm = d - 0.5 * along;
-                } else if a == [0.0; 3] {
-                    arm = 0.5 * along;
+        let own = Vec3::from(surfaces.record[slot].x);
+        for listed in surfaces.kept.of(slot).chunks(NEAR) {
+            // which are near is not to be foretold: all are noted, and those that are not are written over
+            let (mut near, mut count) = ([(0, Vec3::ZERO); NEAR], 0);
+            for &listed in listed {
+                let other = (listed & !FACED) as usize;
+                let d = wrap(model, Vec3::from(surfaces.record[other].x) - own);
+                near[count % NEAR] = (other, d);
+                let limit = if listed & FACED != 0 { faces } else { balls };
+                count += usize::from(d.length_squared() < limit);
+            }
+            for &(other, d) in &near[..count.min(NEAR)] {
+                batch.add(surfaces, k, [slot, other], d);
+                if batch.len == LANES {
+                    let found = law::<SMOOTH, FULL>(input, &batch);
+                    give::<FULL>(input, &batch, &found, touch, &mut friction, slips);
+                    batch.len = 0;
                 }
             }
         }
-        if s >= 1.5 * diameter || part <= 0.0 {
-            continue;
+    }
+    if batch.len > 0 {
+        let found = law::<SMOOTH, FULL>(input, &batch);
+        give::<FULL>(input, &batch, &found, touch, &mut friction, slips);
+    }
+    friction.end(input, touch, slips);
+}
+
+/// Sixteen pairs, and what laws ask of them.
+#[derive(Default)]
+struct Batch {
+    len: usize,
+    /// Particle of the chunk.
+    k: [usize; LANES],
+    slot: [[usize; 2]; LANES],
+    d: [Lanes; 3],
+    v: [Lanes; 3],
+    facing: [[Lanes; 3]; 2],
+    spin: [[Lanes; 3]; 2],
+    inverse_mass: [Lanes; 2],
+    friction: [Lanes; 2],
+    ln_restitution: Lanes,
+    shared_by: Lanes,
+    face: Lanes,
+    stiffness: Lanes,
+    damping: Lanes,
+    counted: Lanes,
+    slip: [Lanes; 3],
+}
+
+impl Batch {
+    #[inline(always)]
+    fn add(&mut self, surfaces: &Surfaces, k: usize, slot: [usize; 2], d: Vec3) {
+        let l = self.len % LANES;
+        let body = slot.map(|slot| surfaces.owner[slot]);
+        let [a, b] = body.map(|body| &surfaces.solid[body as usize]);
+        let [own, other] = slot.map(|slot| surfaces.record[slot].v);
+        let facing = slot.map(|slot| surfaces.facing[slot]);
+        let slip = if surfaces.slips.is_empty() { [0.0; 3] } else { surfaces.slip(Pair { slot, body }) };
+        (self.k[l], self.slot[l]) = (k, slot);
+        for c in 0..3 {
+            self.d[c][l] = d[c];
+            self.v[c][l] = other[c] - own[c];
+            self.slip[c][l] = slip[c];
+            self.facing[0][c][l] = facing[0][c];
+            self.facing[1][c][l] = facing[1][c];
+            self.spin[0][c][l] = a.spin[c];
+            self.spin[1][c][l] = b.spin[c];
         }
-        let mut v = Vec3::from(other.v) - Vec3::from(own.v);
-        if !full {
+        self.inverse_mass[0][l] = a.inverse_mass;
+        self.inverse_mass[1][l] = b.inverse_mass;
+        self.friction[0][l] = a.friction;
+        self.friction[1][l] = b.friction;
+        self.ln_restitution[l] =
+            Model::ln_restitution(a.inverse_mass, a.ln_restitution, b.inverse_mass, b.ln_restitution);
+        self.shared_by[l] = a.shared_by.max(b.shared_by);
+        self.face[l] = a.face.max(b.face);
+        self.stiffness[l] = a.stiffness.max(b.stiffness);
+        self.damping[l] = a.damping.max(b.damping);
+        self.counted[l] = a.sharers.max(b.sharers);
+        self.len += 1;
+    }
+}
+
+/// What laws make of sixteen pairs.
+struct Found {
+    /// Force on the first of each pair (N), and its couple (N m).
+    force: [Lanes; 3],
+    couple: [Lanes; 3],
+    /// The pair's part in a contact of faces.
+    part: Lanes,
+    /// 1 where they touch, and where they would pass through each other.
+    touching: Lanes,
+    deep: Lanes,
+    /// Slip that friction holds (m) and the load that it bears (N), 0 where nothing is to be remembered.
+    slip: [Lanes; 3],
+    load: Lanes,
+    springs: Lanes,
+}
+
+#[inline(always)]
+fn three(of: &[Lanes; 3], l: usize) -> Vec3 {
+    Vec3::new(of[0][l], of[1][l], of[2][l])
+}
+
+/// E10-E13 in lanes: one loop with everything in it, without branches.
+#[inline(always)]
+fn law<const SMOOTH: bool, const FULL: bool>(input: &Input, batch: &Batch) -> Found {
+    let (model, dt) = (input.model, input.dt);
+    let diameter = model.contact_diameter as f32;
+    let spacing = model.spacing as f32;
+    let rate = model.contact_rate();
+    let zero = [0.0; LANES];
+    let mut out = Found {
+        force: [zero; 3],
+        couple: [zero; 3],
+        part: zero,
+        touching: zero,
+        deep: zero,
+        slip: [zero; 3],
+        load: zero,
+        springs: zero,
+    };
+    for l in 0..LANES {
+        let d = three(&batch.d, l);
+        let r = d.length();
+        let (mut n, mut along, mut s, mut part) = (d * (1.0 / r.max(1e-12)), d, r, 1.0);
+        // where they touch, seen from i: midway, or where a ball stands on a face
+        let mut arm = 0.5 * d;
+        if SMOOTH {
+            let (a, b) = (three(&batch.facing[0], l), three(&batch.facing[1], l));
+            let normal = contact::contact_normal(d.to_array(), r, a.to_array(), b.to_array());
+            let normal = Vec3::new(normal.x, normal.y, normal.z);
+            let (a, b) = (a.length_squared() > 0.0, b.length_squared() > 0.0);
+            let faced = (a | b) & ((normal.x != n.x) | (normal.y != n.y) | (normal.z != n.z));
+            let across = d.dot(normal);
+            let on = normal * across;
+            let beside = contact::contact_part((d - on).length() / spacing);
+            (s, part) = if faced { (across, beside) } else { (s, part) };
+            n = if faced { normal } else { n };
+            along = if faced { on } else { along };
+            arm = if faced & !b { d - 0.5 * along } else { arm };
+            arm = if faced & b & !a { 0.5 * along } else { arm };
+        }
+        let near = (s < 1.5 * diameter) & (part > 0.0);
+        let mut v = three(&batch.v, l);
+        let (spin_a, spin_b) = (three(&batch.spin[0], l), three(&batch.spin[1], l));
+        if !FULL {
             // velocities where the bodies touch
-            let spin = |body: u32| Vec3::from(surfaces.spin[body as usize]);
-            v -= spin(owner).cross(arm) + spin(body).cross(d - arm);
+            v -= spin_a.cross(arm) + spin_b.cross(d - arm);
         }
-        let counted = surfaces.sharers[owner as usize].max(surfaces.sharers[body as usize]);
-        let (k, eta) = model.contact_pair_of(owner, body, counted);
-        let f = contact::contact_force(along.to_array(), v.to_array(), s, diameter, k, eta, f32::from(!full), input.dt);
+        let counted = batch.counted[l];
+        let (i_a, i_b) = (batch.inverse_mass[0][l], batch.inverse_mass[1][l]);
+        let mass = 1.0 / (i_a + i_b);
+        let share = [batch.shared_by[l], counted];
+        let (k, eta) = Model::contact_constants(
+            mass,
+            batch.ln_restitution[l],
+            share,
+            rate,
+            [batch.stiffness[l], batch.damping[l]],
+        );
+        let only = if FULL { 0.0 } else { 1.0 };
+        let f = contact::contact_force(along.to_array(), v.to_array(), s, diameter, k, eta, only, dt);
         let mut f = Vec3::new(f.x, f.y, f.z) * part;
         let speed = v.dot(n);
         let overlap = diameter - s;
         let held = counted.max(1.0) * k * (diameter * diameter - overlap * overlap);
-        let mass = model.reduced_mass(owner, body);
-        if overlap > DEEP * diameter && speed < 0.0 && mass * speed * speed > HELD * held {
-            f += n * (speed * part * model.stop(owner, body, input.dt));
-            touch.deep += 1;
+        let deep = near & (overlap > DEEP * diameter) & (speed < 0.0) & (mass * speed * speed > HELD * held);
+        let stop = if dt > 0.0 { mass / (dt * batch.face[l]) } else { 0.0 };
+        f += n * if deep { speed * part * stop } else { 0.0 };
+        let touching = near & (s < diameter);
+        if !FULL {
+            let mu = Model::friction_of(batch.friction[0][l], batch.friction[1][l]);
+            let rubs = touching & (mu > 0.0);
+            let load = (-f.dot(n)).max(0.0);
+            let v = v - n * speed;
+            let k_t = TANGENTIAL * (k * part);
+            let shared = share[0].max(share[1]);
+            let eta_t = part * contact::dashpot(TANGENTIAL_DAMPING, k_t / part * shared, mass) / shared;
+            let turn = 0.5 * dt * (spin_a + spin_b).dot(n);
+            let slip = contact::slip_carried(three(&batch.slip, l).to_array(), n.to_array(), turn);
+            let slip = Vec3::new(slip.x, slip.y, slip.z) + v * dt;
+            let limit = mu * load;
+            let spring = contact::friction((k_t * slip).to_array(), limit);
+            let spring = Vec3::new(spring.x, spring.y, spring.z);
+            let total = contact::friction((spring + eta_t * v).to_array(), limit);
+            f = if rubs { f + Vec3::new(total.x, total.y, total.z) } else { f };
+            let slip = spring / k_t;
+            (out.slip[0][l], out.slip[1][l], out.slip[2][l]) = (slip.x, slip.y, slip.z);
+            out.load[l] = load;
+            out.springs[l] = if rubs { k_t } else { 0.0 };
+            let couple = arm.cross(f);
+            (out.couple[0][l], out.couple[1][l], out.couple[2][l]) = (couple.x, couple.y, couple.z);
         }
-        if s < diameter {
-            touch.contacts += 1;
-            surfaces.stir(owner, body);
-            touch.sharers += part;
-            if !full {
-                let springs = model.friction_pair(owner, body, k * part, part, counted);
-                let pair = Pair { slot: [slot, other_slot], body: [owner, body] };
-                f += friction.pair(input, pair, springs, v - n * speed, (-f.dot(n)).max(0.0), n);
+        (out.force[0][l], out.force[1][l], out.force[2][l]) = (f.x, f.y, f.z);
+        out.part[l] = if near { part } else { 0.0 };
+        out.touching[l] = if touching { 1.0 } else { 0.0 };
+        out.deep[l] = if deep { 1.0 } else { 0.0 };
+    }
+    out
+}
+
+/// Adds what was found to the particles.
+#[inline(always)]
+fn give<const FULL: bool>(
+    input: &Input,
+    batch: &Batch,
+    found: &Found,
+    touch: &mut [Touch],
+    friction: &mut Friction,
+    slips: &mut Vec<Slips>,
+) {
+    let surfaces = &input.surfaces;
+    for l in 0..batch.len.min(LANES) {
+        if found.part[l] <= 0.0 {
+            continue;
+        }
+        if batch.k[l] != friction.k {
+            friction.end(input, touch, slips);
+            friction.k = batch.k[l];
+        }
+        let touch = &mut touch[batch.k[l]];
+        for c in 0..3 {
+            touch.contact[c] += found.force[c][l];
+            if !FULL {
+                touch.couple[c] += found.couple[c][l];
             }
         }
-        touch.contact = (Vec3::from(touch.contact) + f).to_array();
-        if !full {
-            touch.couple = (Vec3::from(touch.couple) + arm.cross(f)).to_array();
+        if found.touching[l] > 0.0 {
+            let slot = batch.slot[l];
+            let pair = Pair { slot, body: slot.map(|slot| surfaces.owner[slot]) };
+            touch.contacts += 1;
+            touch.sharers += found.part[l];
+            touch.deep += found.deep[l] as u32;
+            surfaces.stir(pair.body[0], pair.body[1]);
+            if !FULL && found.springs[l] > 0.0 && surfaces.keeps(pair) {
+                friction.keep(slot[1] as u32, three(&found.slip, l).to_array(), found.load[l]);
+            }
         }
     }
 }
 
-/// Friction of one particle at all its contacts (E13; Cundall and Strack 1979; Luding 2008): what it goes on remembering of them.
+/// What friction of one particle remembers of its contacts (E13; Cundall and Strack 1979; Luding 2008).
 #[derive(Default)]
-pub struct Friction {
+struct Friction {
+    /// Particle of the chunk.
+    k: usize,
     slips: Slips,
     load: [f32; HELD_CONTACTS],
     /// Contacts for whose slip there was no place.
-    pub forgotten: u32,
+    forgotten: u32,
 }
 
 /// Who touches whom: slots and bodies of this particle and of the other.
@@ -174,35 +423,20 @@ struct Pair {
 }
 
 impl Friction {
-    /// Tangential force of a pair with the springs of [`Model::friction_pair`]. `v`: tangential velocity of the other relative to
-    /// this one, `load`: the normal force, `n`: the normal towards the other.
+    /// Notes what the particle goes on remembering, and makes room for the next.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)] // one caller
-    fn pair(
-        &mut self,
-        input: &Input,
-        pair: Pair,
-        (k_t, eta_t, mu): (f32, f32, f32),
-        v: Vec3,
-        load: f32,
-        n: Vec3,
-    ) -> Vec3 {
-        if mu <= 0.0 {
-            return Vec3::ZERO;
+    fn end(&mut self, input: &Input, touch: &mut [Touch], slips: &mut Vec<Slips>) {
+        if self.slips.is_empty() {
+            return;
         }
-        let (surfaces, dt) = (&input.surfaces, input.dt);
-        let spin = pair.body.map(|body| Vec3::from(surfaces.spin[body as usize]));
-        let turn = 0.5 * dt * (spin[0] + spin[1]).dot(n);
-        let slip = contact::slip_carried(surfaces.slip(pair), n.to_array(), turn);
-        let slip = Vec3::new(slip.x, slip.y, slip.z) + v * dt;
-        let limit = mu * load;
-        let spring = contact::friction((k_t * slip).to_array(), limit);
-        let spring = Vec3::new(spring.x, spring.y, spring.z);
-        if surfaces.keeps(pair) && k_t > 0.0 {
-            self.keep(pair.slot[1] as u32, (spring / k_t).to_array(), load);
+        let owner = input.surfaces.owner[input.surfaces.slot[input.first + self.k] as usize];
+        let touch = &mut touch[self.k];
+        touch.forgotten = self.forgotten;
+        if input.model.moves(owner) {
+            slips.push(self.slips);
+            touch.slips = slips.len() as u32;
         }
-        let total = contact::friction((spring + eta_t * v).to_array(), limit);
-        Vec3::new(total.x, total.y, total.z)
+        *self = Self::default();
     }
 
     /// Remembers the slip of a contact; where there are too many, the one that bears least is forgotten.
@@ -223,12 +457,6 @@ impl Friction {
             (self.slips.with[weakest], self.slips.slip[weakest], self.load[weakest]) = (with, slip, load);
         }
     }
-
-    /// What is remembered.
-    #[inline(always)]
-    pub fn slips(&self) -> Option<Slips> {
-        (!self.slips.is_empty()).then_some(self.slips)
-    }
 }
 
 #[cfg(test)]
@@ -243,7 +471,7 @@ mod tests {
         for (with, load) in (0..).zip(loads) {
             friction.keep(with, [load, 0.0, 0.0], load);
         }
-        let slips = friction.slips().expect("eight slips");
+        let slips = friction.slips;
         assert_eq!(friction.forgotten as usize, loads.len() - HELD_CONTACTS);
         // the ninth took the place of the one that bore least, the tenth bears less than any
         assert_eq!((slips.of(8), slips.of(1), slips.of(9)), (Some([8.0, 0.0, 0.0]), None, None));

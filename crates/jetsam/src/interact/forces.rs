@@ -4,7 +4,7 @@
 //! (N) for the particles of bodies; `touch`, of what that force consists; `carry` for XSPH, shifting and the rate of density. Sums over SPH pairs are in [`super::pairs`], contacts of
 //! bodies in [`super::contacts`].
 
-use super::contacts::{self, Friction, Surfaces};
+use super::contacts::{self, Surfaces};
 use super::gradients::confinement;
 use super::lanes::{LANES, listed};
 use super::neighbours::{NeighbourChunk, Runs};
@@ -78,6 +78,8 @@ pub fn fluids<S: Simd>(simd: S, input: Input, slices: &Slices, out: OnFluids) {
 /// Forces on a chunk of particles of bodies.
 #[inline(always)]
 pub fn bodies<S: Simd>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: OnBodies) {
+    out.touch.fill(Touch::default());
+    contacts::chunk(simd, &input, out.touch, out.slips);
     if input.model.plain() && input.mirror.is_empty() {
         on_bodies::<S, true>(simd, input, kind, chunk, out);
     } else {
@@ -85,12 +87,22 @@ pub fn bodies<S: Simd>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk
     }
 }
 
+/// The same where nothing but contacts acts: written for those alone that may touch.
+#[inline(always)]
+pub fn touches<S: Simd>(simd: S, input: Input, out: OnBodies) {
+    contacts::chunk(simd, &input, out.touch, out.slips);
+    for (k, (push, touch)) in out.push.iter_mut().zip(out.touch).enumerate() {
+        if input.surfaces.kept.busy(input.surfaces.slot[input.first + k] as usize) {
+            *push = touch.contact;
+        }
+    }
+}
+
 #[inline(always)]
 fn on_bodies<S: Simd, const PLAIN: bool>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: OnBodies) {
-    out.slips.clear();
-    for (k, runs) in chunk.runs.iter().enumerate() {
-        let i = input.first + k;
-        (out.push[k], out.touch[k]) = on_body::<S, PLAIN>(simd, &input, kind, chunk.list(), runs, i, out.slips);
+    for (k, (push, touch)) in out.push.iter_mut().zip(out.touch).enumerate() {
+        let runs = chunk.runs.get(k).copied().unwrap_or_default();
+        *push = on_body::<S, PLAIN>(simd, &input, kind, chunk.list(), &runs, input.first + k, touch);
     }
 }
 
@@ -192,7 +204,7 @@ fn springs_on(input: &Input, slices: &Slices, k: usize, own: &Record, owner: u32
     contacts
 }
 
-/// Force on a particle of a body, and of what it consists.
+/// Force on a particle of a body; that of fluids is noted beside its contacts.
 #[inline(always)]
 fn on_body<S: Simd, const PLAIN: bool>(
     simd: S,
@@ -201,13 +213,14 @@ fn on_body<S: Simd, const PLAIN: bool>(
     list: &[u32],
     runs: &Runs,
     i: usize,
-    slips: &mut Vec<Slips>,
-) -> ([f32; 3], Touch) {
+    touch: &mut Touch,
+) -> [f32; 3] {
     let model = input.model;
     let own = &input.records[i];
     let owner = input.owner[i];
     let mut force = Vec3::ZERO;
-    if kind == Kind::Static || model.solver.coupling == Coupling::Pressure {
+    let wet = runs.count(Kind::Fluid) > 0;
+    if wet && (kind == Kind::Static || model.solver.coupling == Coupling::Pressure) {
         let mut pairs = Pairs::new(input, Own::one(input.records, i), false);
         let mut terms = Terms::bare([0.0; LANES]);
         for near in listed(input.records, &list[runs.padded(Kind::Fluid)]) {
@@ -226,21 +239,12 @@ fn on_body<S: Simd, const PLAIN: bool>(
     force += sum_contacts(input, own, fluids, |other, fluid| {
         springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
     });
-    let mut touch = Touch { fluid: force.to_array(), ..Touch::default() };
-    let mut friction = Friction::default();
-    for other in [Kind::Rigid, Kind::Static] {
-        contacts::add(input, i, &list[runs.exact(other)], &mut touch, &mut friction);
-    }
+    touch.fluid = force.to_array();
     force += Vec3::from(touch.contact);
-    touch.forgotten = friction.forgotten;
     if model.moves(owner) {
-        if let Some(held) = friction.slips() {
-            slips.push(held);
-            touch.slips = slips.len() as u32;
-        }
         force += fields(model, own) * input.particle_mass[owner as usize];
     }
-    (force.to_array(), touch)
+    force.to_array()
 }
 
 /// Whether a fluid particle meets particles of bodies of a kind by springs (E16): where that is the coupling, and

@@ -9,6 +9,7 @@ pub mod density;
 pub mod forces;
 pub mod gradients;
 pub mod implicit;
+pub mod kept;
 pub mod lanes;
 pub mod links;
 pub mod neighbours;

@@ -1,8 +1,8 @@
 //! Neighbours, found once for all laws of a step.
 //!
-//! For each particle of a kind, the particles of each acting kind closer than the support (between bodies: than the
-//! contact reach), as indices into the
-//! particle arrays, in the order of cells and places. Work goes by chunks of particles and inside a chunk cell by
+//! For each particle of a kind, the particles of each acting kind closer than the support, as indices into the
+//! particle arrays, in the order of cells and places; of bodies' particles among each other those that contacts may
+//! reach, out of which [`super::kept`] makes its lists. Work goes by chunks of particles and inside a chunk cell by
 //! cell: the 27 cells around are packed into a tile that all particles of the cell share, and candidates are
 //! tested sixteen at a time.
 
@@ -126,21 +126,20 @@ pub struct Around<'a> {
     pub first: [usize; Kind::COUNT],
     /// Whether each body sleeps: its particles look for no neighbours.
     pub asleep: &'a [bool],
-    /// Whether fluids are looked for.
-    pub fluids: bool,
-    /// Support radius (m): how far pairs with fluid reach.
-    pub support: f32,
-    /// How far pairs of bodies reach (m).
-    pub contact_reach: f32,
+    /// Whether bodies' particles look for each other; else for fluids.
+    pub contacts: bool,
+    /// How far pairs reach (m): the support, or as far as contacts are looked for.
+    pub reach: f32,
 }
 
-/// Which kinds act on a particle of kind `kind`: the table of [`crate::laws`].
-fn acting(kind: Kind, fluids: bool) -> &'static [Kind] {
-    let all: &[Kind] = match kind {
-        Kind::Fluid | Kind::Rigid => &[Kind::Fluid, Kind::Rigid, Kind::Static],
-        Kind::Static => &[Kind::Fluid, Kind::Rigid],
-    };
-    if fluids { all } else { &all[1..] }
+/// Which kinds act on a particle of kind `kind`: the table of [`crate::laws`]. Contacts of bodies have lists of their own.
+fn acting(kind: Kind, contacts: bool) -> &'static [Kind] {
+    match (kind, contacts) {
+        (Kind::Fluid, _) => &[Kind::Fluid, Kind::Rigid, Kind::Static],
+        (_, false) => &[Kind::Fluid],
+        (Kind::Rigid, true) => &[Kind::Rigid, Kind::Static],
+        (Kind::Static, true) => &[Kind::Rigid],
+    }
 }
 
 impl NeighbourChunk {
@@ -174,7 +173,7 @@ impl NeighbourChunk {
             let asleep = |i: usize| kind == Kind::Rigid && around.asleep[around.owner[i] as usize];
             let all_asleep = (from..to).all(asleep);
             let mut candidates = 0;
-            for &k in if all_asleep { &[] } else { acting(kind, around.fluids) } {
+            for &k in if all_asleep { &[] } else { acting(kind, around.contacts) } {
                 let mut rows = [Row::default(); 27];
                 let rows = around.rows(k, cell, &mut rows);
                 if kind == Kind::Fluid && k != Kind::Static {
@@ -205,15 +204,13 @@ impl NeighbourChunk {
             }
             for i in from..to {
                 let mut runs = Runs { begin: used as u32, count: [0; Kind::COUNT] };
-                for &k in if asleep(i) { &[] } else { acting(kind, around.fluids) } {
+                for &k in if asleep(i) { &[] } else { acting(kind, around.contacts) } {
                     let tile = &scratch.tile[k as usize];
                     if tile.len == 0 {
                         continue;
                     }
                     let not = if (kind, k) == (Kind::Rigid, Kind::Rigid) { Some(around.owner[i]) } else { None };
-                    let reach =
-                        if kind == Kind::Fluid || k == Kind::Fluid { around.support } else { around.contact_reach };
-                    let limit = reach * reach;
+                    let limit = around.reach * around.reach;
                     let list = &mut self.list[used..];
                     let r_sq = &mut bytemuck::cast_slice_mut(&mut scratch.r_sq)[used - base..];
                     let n = near(simd, &tile.candidates(), around.records[i].x, limit, not, i as u32, list, r_sq);

@@ -20,6 +20,7 @@ pub const SCENES: &[Builtin] = &[
     Builtin { name: "mountain-slide", text: include_str!("../../../../scenes/mountain-slide.toml") },
     Builtin { name: "bench-dam", text: include_str!("../../../../scenes/bench-dam.toml") },
     Builtin { name: "bench-bricks", text: include_str!("../../../../scenes/bench-bricks.toml") },
+    Builtin { name: "bench-balls", text: include_str!("../../../../scenes/bench-balls.toml") },
     Builtin { name: "bench-flock", text: include_str!("../../../../scenes/bench-flock.toml") },
     Builtin { name: "dam-break", text: include_str!("../../../../scenes/dam-break.toml") },
     Builtin { name: "cup", text: include_str!("../../../../scenes/cup.toml") },

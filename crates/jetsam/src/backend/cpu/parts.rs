@@ -89,21 +89,7 @@ impl Cpu {
     fn move_bodies(&mut self, model: &Model, part: Advance) {
         let b = &mut self.state.bodies;
         self.implicit.impulse += first_kick(model.solver.integrator, part.dt) * self.outside_bodies;
-        let paths = model.paths.par_iter().with_min_len(CHUNK);
-        b.body.par_iter_mut().zip(paths).for_each(|(body, path)| match path {
-            Some(path) => bodies::script(body, path, part.end()),
-            None => bodies::half_kick(body, model, part.dt),
-        });
-        joints::drift(b, model, part.dt);
-        b.body.par_iter_mut().with_min_len(CHUNK).for_each(|body| bodies::drift(body, model, part.dt));
-        bodies::follow(b, model);
-    }
-
-    /// Contacts of bodies as they stand now, without fluids. What stands is left out: what it feels is the opposite of what they do.
-    fn touch(&mut self, model: &Model, part: Advance) {
-        self.copy_bodies(&model.grid, Kind::Rigid);
-        self.find_bodies(model, &[Kind::Rigid], false);
-        self.forces(model, part, &[Kind::Rigid]);
+        bodies::advance(b, model, part);
     }
 
     /// The kick that ends a part, after contacts were summed: fluids push as they did at the step's beginning.
