@@ -41,7 +41,7 @@ impl Slices {
                 let most = self.counts[begin..end].iter().map(|c| c[kind as usize]).max().unwrap_or(0) as usize;
                 let room = self.used + most.next_multiple_of(LANES);
                 if self.list.len() < room {
-                    self.list.reserve_exact(room - self.list.len() + room / 8); // lists are most of a particle's memory
+                    self.list.reserve_exact(room - self.list.len() + room / 32); // lists are most of a particle's memory
                     self.list.resize(room, Indices::default());
                 }
                 for from in (0..most).step_by(LANES) {
