@@ -125,6 +125,7 @@ impl Kept {
 
     /// Takes new lists out of what was found among sorted particles: chunk by chunk of rigid, then of static ones. `slot` is that of each
     /// particle, `segment` the particles of both kinds, `place` where the particle of a slot stands: its chunk among all, and its number there; none outside the domain.
+    #[allow(clippy::too_many_arguments)] // one caller
     pub fn renew(
         &mut self,
         model: &Model,
