@@ -52,7 +52,12 @@ fn a_tank_at_rest_yields_as_far_as_its_rounds_reach() {
         watch(&mut w, 1.0, 1e-3, &format!("{rounds} rounds"));
         let [most, mean] = watch(&mut w, 1.5, 1e-3, &format!("{rounds} rounds"));
         let stated = yields(&w, rounds);
-        println!("{rounds} rounds: {mean} {most}, stated {}; {} m/s, E_k {}", 0.5 * stated, w.ledger().speed, w.ledger().kinetic);
+        println!(
+            "{rounds} rounds: {mean} {most}, stated {}; {} m/s, E_k {}",
+            0.5 * stated,
+            w.ledger().speed,
+            w.ledger().kinetic
+        );
         assert!(mean < stated, "{rounds} rounds: compressed by {mean}, half of {stated} stated");
         assert!(most < 0.3, "{rounds} rounds: a particle is compressed by {most}");
         // at rest: less than would lift all by a tenth of a spacing
