@@ -131,7 +131,7 @@ fn errors_of_places(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups
   if (clock.running == 0u || i >= first_static()) { return; }
   flow[i] = vec4<f32>(0.0);
   if (i >= live_fluid()) { return; }
-  let share = begun(before[i].w, nodes[i].all.w, clock.dt);
+  let share = begun(before[i].x, nodes[i].all.w, clock.dt);
   work[i] = vec4<f32>(share, work[i].y + max(push[i].w - 1.0, 0.0), 0.0, 0.0);
   spot[i].w = share;
 }
