@@ -80,8 +80,7 @@ fn aim_at(scene: &mut Scene, solver: Pressure, aim: f64) -> miette::Result<()> {
             s.longest_dt = Some(1.0 / 120.0);
         }
         Pressure::Pbf => {
-            s.tolerance = 0.4 * aim;
-            s.courant_flow = Some(if coarse { 1.0 } else { 0.3 });
+            s.tolerance = if coarse { 0.3 * aim } else { 0.8 * aim };
         }
         Pressure::Wcsph => {
             let speed = scene.assemble().map_err(|e| *e)?.model.largest_speed;

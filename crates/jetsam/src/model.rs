@@ -39,6 +39,8 @@ pub struct Model {
     pub contacts: Vec<ContactModel>,
     /// Largest speed the scene can reach (m/s), from depth, drop height and velocities.
     pub largest_speed: f64,
+    /// Depth of the fluids where it is largest when time begins (m): their volume in a column as wide as the support, over its base.
+    pub depth: f64,
     /// Speed of sound `c_0` (m/s).
     pub sound_speed: f64,
     /// Gravity (m/s^2).
@@ -87,6 +89,10 @@ pub struct Factors {
     pub g: f32,
     /// From the viscosity kernel's shape to `nabla^2 W` (1/m^(d+2)), exact alike.
     pub laplacian: f32,
+    /// Jacobi's factor in rounds of implicit pressure (E9): 0.9 over the largest eigenvalue that a resting lattice has.
+    pub relaxation: f32,
+    /// How much pressure over density one round of it puts against a compression of a resting lattice, times `dt^2 / dx^2`.
+    pub reach: f32,
 }
 
 impl Factors {
@@ -98,7 +104,16 @@ impl Factors {
         let laplacian = Kernel::laplacian_norm(dimensions) / support.powi(d + 2);
         let laplacian = laplacian / Kernel::lattice_laplacian(spacings, dimensions);
         let at = |s: f64| w as f32 * density.w(s as f32);
-        Self { w: w as f32, w_spacing: at(1.0 / spacings), w_own: at(0.0), g: g as f32, laplacian: laplacian as f32 }
+        let (stiffness, own) = force.lattice_stiffness(spacings, dimensions);
+        Self {
+            w: w as f32,
+            w_spacing: at(1.0 / spacings),
+            w_own: at(0.0),
+            g: g as f32,
+            laplacian: laplacian as f32,
+            relaxation: (0.9 / stiffness) as f32,
+            reach: (0.9 / stiffness / own) as f32,
+        }
     }
 }
 
@@ -245,6 +260,13 @@ impl DtBound {
 pub const TRAVEL: f64 = 0.1;
 /// Spacings that a particle pressed by its neighbours may swing in a step of DFSPH; a tank at rest is stable up to 0.6.
 const SWING: f64 = 0.35;
+/// The same in a step of PBF with a small budget of rounds; a dam and a tank are stable up to 0.47. Twice that where there is room for
+/// directions found anew where particles were moved: stable up to 0.96.
+const SWING_PBF: f64 = 0.4;
+/// With so many rounds a step there is room for that.
+const ROOM: f64 = 24.0;
+/// Rounds of PBF end at no larger error than this, but for want of a budget.
+const LOOSE: f64 = 0.003;
 /// No step is cut into more steps of bodies than this.
 const MOST_SUBSTEPS: f64 = 1000.0;
 
@@ -453,18 +475,57 @@ impl Model {
     /// How far the fastest particle gets in a step of implicit pressure (m), and the factor by which [`Ledger::pressed`] counts as a
     /// speed (E29).
     pub(crate) fn bounds_of_flow(&self) -> [f64; 2] {
-        let pressed = if self.solver.pressure == Pressure::Dfsph { self.courant_flow() / SWING } else { 0.0 };
+        let pressed = match self.solver.pressure {
+            Pressure::Pbf if self.budget() >= ROOM => 0.0,
+            Pressure::Pbf => self.courant_flow() / SWING_PBF,
+            _ => self.courant_flow() / SWING,
+        };
         [self.courant_flow() * self.spacing, pressed]
     }
 
-    /// The longest step of implicit pressure (s).
-    pub(crate) fn longest_step(&self) -> f64 {
-        let longest = if self.solver.pressure == Pressure::Pbf { 1.0 / 120.0 } else { 1.0 / 200.0 };
-        self.solver.longest_dt.unwrap_or(longest)
+    /// How far fluids yield to PBF's pressures: compression over `p / rho_0` (s^2/m^2; E9). As little as the rounds of the budget can hold in
+    /// the longest step: a fluid with a speed of sound. Without it, it would be stiffer in shorter steps, and gain energy by each step that
+    /// is shortened while it is compressed.
+    pub fn compliance(&self) -> f64 {
+        let n = self.budget();
+        let reach = 2.0 / 3.0 * n * (n + 1.0) * f64::from(self.factors.reach);
+        (self.longest_step() / self.spacing).powi(2) / reach
     }
 
-    /// The speed by which steps are bound (m/s): that of the fastest particle. With DFSPH, which holds the directions of pairs for
-    /// a step, also that with which pressed particles swing about their places: `dt sqrt(p / rho) <= 0.35 dx`.
+    /// Most rounds of a solve of implicit pressure, or of a step of PBF. PBF that may leave much makes as many as leave that in a tank at
+    /// rest: rounds that end as soon as the mean is small would leave now more and now less, and waves grow by it.
+    pub fn budget(&self) -> f64 {
+        let s = &self.solver;
+        if s.pressure != Pressure::Pbf || s.tolerance <= LOOSE {
+            return s.iterations;
+        }
+        // 2/3 n (n + 1) reach = 0.65 swing^2 / tolerance: half of what the bottom yields, and a third more for rounds that are not over
+        let product = 0.65 * SWING_PBF * SWING_PBF / s.tolerance / (2.0 / 3.0 * f64::from(self.factors.reach));
+        s.iterations.min(((0.25 + product).sqrt() - 0.5).ceil())
+    }
+
+    /// Mean compression at which rounds that correct places end.
+    pub fn tolerance(&self) -> f64 {
+        if self.solver.pressure == Pressure::Pbf { self.solver.tolerance.min(LOOSE) } else { self.solver.tolerance }
+    }
+
+    /// The longest step of implicit pressure (s): stated, or 1/200 s with DFSPH and 1/120 s with PBF, and there no longer than
+    /// what lies at the bottom bears, once it is pressed (E29).
+    pub(crate) fn longest_step(&self) -> f64 {
+        let pbf = self.solver.pressure == Pressure::Pbf;
+        let longest = self.solver.longest_dt.unwrap_or(if pbf { 1.0 / 120.0 } else { 1.0 / 200.0 });
+        let weight = self.gravity.length() * self.depth;
+        if !pbf || weight == 0.0 {
+            return longest;
+        }
+        let swing = if self.budget() < ROOM { SWING_PBF } else { 2.0 * SWING_PBF };
+        longest.min(swing * self.spacing / weight.sqrt())
+    }
+
+    /// The speed by which steps are bound (m/s): that of the fastest particle, and with implicit pressure that with which pressed
+    /// particles swing about their places: `dt sqrt(p / rho) <= 0.35 dx` with DFSPH, which holds the directions of pairs for a step, 0.4 dx
+    /// with PBF on a budget of less than 24 rounds, which has none left to find them anew. With more, PBF is bound by the weight of what lies
+    /// on the bottom alone: [`Model::longest_step`].
     pub fn bounding_speed(&self, ledger: &Ledger) -> f64 {
         ledger.speed.max(self.bounds_of_flow()[1] * ledger.pressed)
     }

@@ -11,6 +11,7 @@ use crate::model::{
 use crate::scene::joint::{JointKind, JointModel};
 use crate::scene::{Coupling, Density, EquationOfState, Force, Pressure, PressureForce, Scene, Solver, Start};
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// Reynolds number of a spacing below which walls show a mirrored velocity to viscosity: above, the layer that does not slip
 /// is thinner than particles can show.
@@ -139,6 +140,7 @@ impl Scene {
             flocks: Vec::new(),
             contacts,
             largest_speed,
+            depth: self.depth(&fluid, gravity),
             sound_speed,
             gravity,
             sources,
@@ -204,6 +206,20 @@ impl Scene {
             _ => None,
         };
         held.filter_map(partner).collect()
+    }
+
+    /// Depth of the fluids where it is largest (m): their volume in a column as wide as the support, over its base.
+    fn depth(&self, fluid: &[Drop], gravity: DVec3) -> f64 {
+        let Some(down) = gravity.try_normalize() else { return 0.0 };
+        let (dx, d) = (self.resolution.spacing, self.world.dimensions as i32);
+        let wide = self.solver.support * dx;
+        let (a, b) = down.any_orthonormal_pair();
+        let mut columns = BTreeMap::new();
+        for drop in fluid {
+            let column = [a, b].map(|axis| (drop.x.dot(axis) / wide).floor() as i64);
+            *columns.entry(column).or_insert(0u32) += 1;
+        }
+        f64::from(columns.into_values().max().unwrap_or(0)) * dx.powi(d) / wide.powi(d - 1)
     }
 
     /// Largest speed the scene can reach (m/s): from depth, drop height and velocities given.

@@ -3,7 +3,8 @@
 //!
 //! A round has two passes. [`accelerate`]: shares become accelerations of fluids, by the laws of E4 and E17.
 //! [`rates`] and [`relax`]: accelerations become rates of density, by the same vectors transposed, and shares are relaxed. The
-//! relaxation is Jacobi's with Nesterov's momentum, begun anew whenever it runs against the descent. Called by the stages
+//! relaxation is Jacobi's, accelerated by Chebyshev polynomials of the fourth kind (Lottes 2023), begun anew whenever it runs against the
+//! descent. Called by the stages
 //! `divergence` and `pressure`.
 
 use super::lanes::{LANES, Lanes, axes, load, store, vectors};
@@ -98,12 +99,14 @@ fn lanes<S: Simd>(simd: S, of: &Lanes) -> f32x16<S> {
 /// How shares are relaxed in one round.
 #[derive(Clone, Copy, Debug)]
 pub struct Round {
-    /// Jacobi's factor over the square of time for which accelerations act (1/s^2).
+    /// Jacobi's factor.
     pub omega: f32,
     /// From rates of acceleration to what the error counts (s^2; 1 for the divergence).
     pub scale: f32,
-    /// Nesterov's momentum.
-    pub momentum: f32,
+    /// How far fluids yield: compression by a pressure of their own rest density times 1 m^2/s^2 (s^2/m^2).
+    pub compliance: f32,
+    /// The number of the round since the acceleration began.
+    pub number: f32,
     /// Pressure up to which gravity fades out between fluids and bodies (Pa).
     pub limit: f32,
 }
@@ -114,47 +117,49 @@ pub struct Shares<'a> {
     pub share: &'a mut [f32],
     /// Their [`implicit::hold`].
     pub hold: &'a mut [f32],
-    /// What a round came to.
-    pub found: &'a mut [f32],
+    /// Those that pushed in the round before.
+    pub before: &'a mut [f32],
 }
 
 /// What a round says of a chunk.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Said {
-    /// Sum of what is left of the errors.
+    /// Sum of the errors that the shares left which pushed.
     pub error: f64,
-    /// Whether momentum runs against the descent, if positive.
+    /// Whether the change of shares runs against the descent, if positive.
     pub against: f64,
 }
 
 /// Relaxes the shares of a chunk. `error` is what is wrong without pressure, `rate` what the shares do about it; `share`
-/// holds the shares that pushed and receives those to push with next, `found` the last round's result and this one's.
+/// holds the shares that pushed and receives those to push with next, `before` those of the round before and those that pushed.
 #[inline(always)]
 pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rate: &[f32], shares: Shares) -> Said {
-    let Shares { share, hold, found } = shares;
+    let Shares { share, hold, before } = shares;
+    let (kept, stride) = (implicit::carried(round.number), implicit::stride(round.number));
     let mut sums = [[0.0; LANES]; 2];
     for (s, nodes) in nodes.iter().enumerate() {
         let at = LANES * s;
         let read = |from: &[f32]| load(simd, from, at).to_array();
-        let (error, rate, was, before) = (read(error), read(rate), read(share), read(found));
-        let (mut now, mut next, mut held) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (error, rate, own, last) = (read(error), read(rate), read(share), read(before));
+        let (mut now, mut held) = ([0.0; LANES], [0.0; LANES]);
         let (mut change, mut against) = ([0.0; LANES], [0.0; LANES]);
         for l in 0..LANES {
-            let response = nodes.response[l];
-            let left = error[l] + round.scale * rate[l];
-            now[l] = implicit::relaxed(was[l], left, round.omega / response);
+            let compliance = round.compliance * nodes.inverse_rho[l];
+            let left = error[l] + round.scale * rate[l] - compliance * own[l];
+            let answer = round.scale * nodes.response[l] + compliance;
+            let by = round.omega / answer;
             // what the share should still change by, in compression: of particles without pressure only the excess counts
-            change[l] = (now[l] - was[l]).abs() * response / round.omega;
-            against[l] = (was[l] - now[l]) * (now[l] - before[l]) * response;
-            next[l] = (now[l] + round.momentum * (now[l] - before[l])).max(0.0);
-            held[l] = implicit::hold(next[l], round.limit);
+            change[l] = (implicit::relaxed(own[l], left, by, 0.0) - own[l]).abs() * answer / round.omega;
+            now[l] = implicit::relaxed(own[l], left, stride * by, kept * (own[l] - last[l]));
+            against[l] = left * (own[l] - now[l]);
+            held[l] = implicit::hold(now[l], round.limit);
         }
         let members = LANES.min(share.len() - at);
         for l in 0..members {
             sums[0][l] += f64::from(change[l]);
             sums[1][l] += f64::from(against[l]);
         }
-        for (to, from) in [(&mut *found, now), (&mut *share, next), (&mut *hold, held)] {
+        for (to, from) in [(&mut *before, own), (&mut *share, now), (&mut *hold, held)] {
             store(f32x16::load_array(simd, from), to, at);
         }
     }

@@ -9,10 +9,10 @@ const OVER: u32 = 3u;
 // solve.number of DFSPH; that of PBF is its turn.
 const VELOCITIES: u32 = 0u;
 const PLACES: u32 = 1u;
-// Jacobi's factor (Bender and Koschier 2015).
-const OMEGA: f32 = 0.5;
 // An error so many times the least so far says that rounds do not converge.
 const WORSE: f32 = 10.0;
+// The part of the shares of the step before with which PBF begins.
+const WARM: f32 = 0.5;
 // How often PBF finds the vectors to neighbours anew in a step.
 const TURNS: u32 = 3u;
 
@@ -24,10 +24,9 @@ fn begin(number: u32) {
   solve.number = number;
   solve.iterations = 0u;
   solve.residual = 0.0;
-  solve.pace = 1.0;
-  solve.momentum = 0.0;
+  solve.since = 0.0;
   solve.best = 3.4e38;
-  solve.omega = OMEGA / (clock.dt * clock.dt);
+  solve.omega = m.relax.x;
   solve.phase = select(OVER, ROUNDS, live_fluid() > 0u && clock.dt > 0.0);
 }
 
@@ -132,7 +131,7 @@ fn errors_of_places(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups
   if (clock.running == 0u || i >= first_static()) { return; }
   flow[i] = vec4<f32>(0.0);
   if (i >= live_fluid()) { return; }
-  let share = begun(before[i].w, nodes[i].all.w, clock.dt);
+  let share = begun(before[i].x, nodes[i].all.w, clock.dt);
   work[i] = vec4<f32>(share, work[i].y + max(push[i].w - 1.0, 0.0), 0.0, 0.0);
   spot[i].w = share;
 }
@@ -231,39 +230,41 @@ fn relax_one(i: u32) -> vec2<f32> {
   let rate = rate_of(i);
   let w = work[i];
   let share = spot[i].w;
-  let answer = nodes[i].all.w;
-  let now = relaxed(share, w.y + clock.dt * clock.dt * rate, solve.omega / answer);
-  work[i] = vec4<f32>(now, w.y, rate, w.w);
-  spot[i].w = max(now + solve.momentum * (now - w.x), 0.0);
+  let scale = clock.dt * clock.dt;
+  let compliance = m.relax.y * nodes[i].solid.w;
+  let left = w.y + scale * rate - compliance * share;
+  let by = solve.omega / (scale * nodes[i].all.w + compliance);
+  let now = relaxed(share, left, stride(solve.since) * by, carried(solve.since) * (share - w.x));
+  work[i] = vec4<f32>(share, w.y, rate, w.w);
+  spot[i].w = now;
   // what the share should still change by, in compression: of particles without pressure only the excess counts
-  return vec2<f32>(abs(now - share) * answer / solve.omega, (share - now) * (now - w.x) * answer);
+  return vec2<f32>(abs(relaxed(share, left, by, 0.0) - share) / by, left * (share - now));
 }
+
+fn tolerance() -> f32 { return select(m.rounds.x, m.rounds.y, !PBF && solve.number == VELOCITIES); }
 
 // A round: whether it was the last, and how fast the next goes on.
 @compute @workgroup_size(256)
 fn judge(@builtin(local_invocation_index) l: u32) {
   let sum = all_said(l);
   if (l != 0u || !in_round()) { return; }
-  let velocities = !PBF && solve.number == VELOCITIES;
-  let tolerance = select(m.rounds.x, m.rounds.y, velocities);
-  var pace = 0.5 * (1.0 + sqrt(1.0 + 4.0 * solve.pace * solve.pace));
-  if (sum.y > 0.0) { pace = 1.0; }
+  solve.since = select(solve.since + 1.0, 0.0, sum.y > 0.0);
   let residual = sum.x / f32(live_fluid());
   if (residual > WORSE * solve.best) {
     // a body too light, or places too odd, for steps so long
-    pace = 1.0;
+    solve.since = 0.0;
     solve.omega *= 0.5;
   }
-  solve.pace = pace;
-  solve.momentum = (pace - 1.0) / (0.5 * (1.0 + sqrt(1.0 + 4.0 * pace * pace)));
   solve.best = min(solve.best, residual);
   solve.iterations += 1u;
   solve.residual = residual;
-  if (velocities) { solve.said = vec4<f32>(solve.said.xy, f32(solve.iterations), residual); }
+  if (!PBF && solve.number == VELOCITIES) { solve.said = vec4<f32>(solve.said.xy, f32(solve.iterations), residual); }
   else if (PBF) { solve.said.x += 1.0; }
   else { solve.said = vec4<f32>(f32(solve.iterations), residual, solve.said.zw); }
   clock.rounds[solve.number] = max(clock.rounds[solve.number], solve.iterations);
-  if (residual <= tolerance || f32(solve.iterations) >= m.rounds.z) { solve.phase = DONE; }
+  // the turns of PBF share its budget
+  let rounds = select(f32(solve.iterations), solve.said.x, PBF);
+  if (residual <= tolerance() || rounds >= m.rounds.z) { solve.phase = DONE; }
 }
 
 // After the rounds that were queued: on, or halt for more.
@@ -282,10 +283,12 @@ fn finish(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<
   let i = number(g, n, l, 128u);
   if (!ended() || i >= live_fluid()) { return; }
   let w = work[i];
-  spot[i].w = w.x;
+  // where the shares that pushed were good enough they stay
+  let share = select(spot[i].w, w.x, solve.residual <= tolerance());
+  spot[i].w = share;
   var sum = w.w;
-  if (PBF) { sum = select(w.w, 0.0, solve.turn == 1u) + w.x; }
-  work[i] = vec4<f32>(w.x, w.y + clock.dt * clock.dt * w.z, 0.0, sum);
+  if (PBF) { sum = select(w.w, 0.0, solve.turn == 1u) + share; }
+  work[i] = vec4<f32>(share, w.y + clock.dt * clock.dt * w.z, 0.0, sum);
 }
 
 // DFSPH: velocities that do not compress.

@@ -72,13 +72,20 @@ fn link_one(i: u32) -> f32 {
   return max(push[i].w - 1.0, 0.0);
 }
 
-// Places, and where shares begin: those of the step before. DFSPH begins with velocities.
+// The part of the shares of the step before with which PBF begins: what corrected places in a shorter step would move them farther.
+fn warm() -> f32 {
+  let ratio = clock.dt_before / max(clock.dt, 1e-30);
+  return WARM * min(ratio * ratio, 1.0);
+}
+
+// Places, and where shares begin: from those of the step before. DFSPH begins with velocities.
 @compute @workgroup_size(128)
 fn seat(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let i = number(g, n, l, 128u);
   if (clock.running == 0u || solve.phase == OVER) { return; }
   if (i < live_fluid()) {
-    let share = select(records[i].v.w, 0.0, PBF && solve.turn > 1u);
+    var share = records[i].v.w;
+    if (PBF) { share *= select(warm(), 0.0, solve.turn > 1u); }
     spot[i] = vec4<f32>(records[i].x.xyz, share);
     work[i] = vec4<f32>(share, push[i].w - 1.0, 0.0, work[i].w);
     flow[i] = vec4<f32>(records[i].v.xyz, 0.0);

@@ -13,9 +13,19 @@ fn response(fluids_dot_all: f32, all_sq: f32, inverse_rho: f32, pairs: f32) -> f
   return max(fluids_dot_all, all_sq) * inverse_rho + pairs;
 }
 
-// A share after one more round: never negative, as fluids bear no tension. error = what D is above 1, or its rate above 0.
-fn relaxed(share: f32, error: f32, rate: f32) -> f32 {
-  return max(share + error * rate, 0.0);
+// A share after one more round: never negative, as fluids bear no tension. error = what D is above 1, or its rate above 0; went =
+// what the last round changes it by still.
+fn relaxed(share: f32, error: f32, rate: f32, went: f32) -> f32 {
+  return max(share + error * rate + went, 0.0);
+}
+
+// Of round k = 0, 1, 2, ..: the part of the last change that is kept, and the factor of Jacobi's step. Residuals then are Chebyshev
+// polynomials of the fourth kind: of all polynomials of so few rounds those that leave least of what is slow (Lottes 2023, alg. 3).
+fn carried(k: f32) -> f32 {
+  return max(2.0 * k - 1.0, 0.0) / (2.0 * k + 3.0);
+}
+fn stride(k: f32) -> f32 {
+  return (8.0 * k + 4.0) / (2.0 * k + 3.0);
 }
 
 // Where the share that corrects a place begins: at half of what it was at the last step (Bender and Koschier 2015), but with no more than

@@ -5,6 +5,7 @@
 //! m^-3 (m^-2 in two dimensions).
 
 use super::shape;
+use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -203,6 +204,26 @@ impl Kernel {
         })
     }
 
+    /// Largest eigenvalue, over all waves, of what Jacobi's rounds of implicit pressure (E9) iterate on the infinite lattice:
+    /// `|sum_j e_ij sin(k . x_ij)|^2 / sum_j |e_ij|^2`, `e_ij = V_j grad_i W_ij`; and `dx^2 sum_j |e_ij|^2` for exact gradients.
+    pub fn lattice_stiffness(self, support_over_spacing: f64, dimensions: u32) -> (f64, f64) {
+        const WAVES: i32 = 16;
+        let mut near = Vec::new();
+        lattice(support_over_spacing, dimensions, |r, x| {
+            let slope = if r > 0.0 { self.slope(r, support_over_spacing, dimensions) / r } else { 0.0 };
+            near.push((x, slope * x));
+        });
+        let own: f64 = near.iter().map(|(_, e)| e.length_squared()).sum();
+        let waves = |axis: i32| 0..=if axis == 1 && dimensions == 2 { 0 } else { WAVES };
+        let mut largest = 0.0f64;
+        for (i, j, k) in waves(0).flat_map(|i| waves(1).flat_map(move |j| waves(2).map(move |k| (i, j, k)))) {
+            let wave = PI / f64::from(WAVES) * DVec3::new(i.into(), j.into(), k.into());
+            let sum: DVec3 = near.iter().map(|(x, e)| wave.dot(*x).sin() * *e).sum();
+            largest = largest.max(sum.length_squared());
+        }
+        (largest / own, own / self.lattice_gradient(support_over_spacing, dimensions).powi(2))
+    }
+
     /// `sum x^2 nabla^2 W dx^d / 2` of the viscosity kernel over the infinite lattice: 1 where Laplacians are exact.
     pub fn lattice_laplacian(support_over_spacing: f64, dimensions: u32) -> f64 {
         let factor = Self::laplacian_norm(dimensions) / support_over_spacing.powi(dimensions as i32 + 2);
@@ -214,16 +235,21 @@ impl Kernel {
 
 /// Sum of `f(r, x)` over the points of the infinite lattice within the support, in units of the spacing.
 fn over_lattice(support: f64, dimensions: u32, f: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut sum = 0.0;
+    lattice(support, dimensions, |r, x| sum += f(r, x.x));
+    sum
+}
+
+/// The points of the infinite lattice within the support, and how far they are from its middle, in units of the spacing.
+fn lattice(support: f64, dimensions: u32, mut each: impl FnMut(f64, DVec3)) {
     let n = support.ceil() as i32;
     let depth = if dimensions == 3 { n } else { 0 };
-    let mut sum = 0.0;
     for i in -n..=n {
         for j in -depth..=depth {
             for k in -n..=n {
-                let r = f64::from(i * i + j * j + k * k).sqrt();
-                sum += f(r, f64::from(i));
+                let x = DVec3::new(i.into(), j.into(), k.into());
+                each(x.length(), x);
             }
         }
     }
-    sum
 }

@@ -155,13 +155,15 @@ pub struct Solver {
     /// How pressure is found.
     #[serde(default)]
     pub pressure: Pressure,
-    /// Mean compression, as a fraction of the rest density, at which the iterations of implicit pressure end (E9).
+    /// Mean compression, as a fraction of the rest density, at which the iterations of implicit pressure end (E9). PBF meets one above
+    /// 0.003 by a budget of iterations.
     #[serde(default = "d::tolerance")]
     pub tolerance: f64,
     /// The same for the compression that velocities bring in a step (E9, DFSPH).
     #[serde(default = "d::divergence_tolerance")]
     pub divergence_tolerance: f64,
-    /// Most iterations of implicit pressure in a step, of each kind (E9): a budget for real time.
+    /// Most iterations of implicit pressure in a step, of each kind (E9): a budget for real time. On one below 24 fluids yield under PBF:
+    /// 4 leave about 1 % of compression, 8 about 0.3 %.
     #[serde(default = "d::iterations")]
     pub iterations: f64,
     /// How density is found (E1).

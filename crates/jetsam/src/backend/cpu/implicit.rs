@@ -19,8 +19,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Jacobi's factor (Bender and Koschier 2015).
-const OMEGA: f32 = 0.5;
+/// The part of the shares of the last step with which PBF begins. Shares that errors are added to step after step control places by
+/// their integral: whatever rounds leave then grows, unless at least half of them is forgotten (docs/physics.md, E9).
+const WARM: f32 = 0.5;
 /// How often PBF finds the vectors to neighbours anew in a step.
 const TURNS: u32 = 3;
 /// An error so many times the least so far says that rounds do not converge.
@@ -33,7 +34,7 @@ pub(super) struct Implicit {
     nodes: Vec<Nodes>,
     share: Vec<f32>,
     hold: Vec<f32>,
-    found: Vec<f32>,
+    before: Vec<f32>,
     /// Shares (Pa) that corrected places at the last step, in the order of today.
     places: Vec<f32>,
     /// Accelerations, or velocities (m/s), of fluids and rigid bodies' particles.
@@ -199,18 +200,18 @@ impl Cpu {
     /// One round: the rates of what `flow` holds, and all shares relaxed by them.
     fn relax(&mut self, round: Round) -> Said {
         let level = self.level;
-        let Implicit { links, nodes, flow, share, hold, found, error, rate, said, .. } = &mut self.implicit;
+        let Implicit { links, nodes, flow, share, hold, before, error, rate, said, .. } = &mut self.implicit;
         said.resize(links.len(), Said::default());
         let flow = &flow[..];
-        let shares = share.par_chunks_mut(CHUNK).zip(hold.par_chunks_mut(CHUNK)).zip(found.par_chunks_mut(CHUNK));
+        let shares = share.par_chunks_mut(CHUNK).zip(hold.par_chunks_mut(CHUNK)).zip(before.par_chunks_mut(CHUNK));
         let read = nodes.par_chunks(CHUNK / LANES).zip(error.par_chunks(CHUNK)).zip(links.par_iter());
         let all = said.par_iter_mut().zip(rate.par_chunks_mut(CHUNK)).zip(shares.zip(read)).enumerate();
-        all.for_each(|(c, ((said, rate), (((share, hold), found), ((nodes, error), links))))| {
+        all.for_each(|(c, ((said, rate), (((share, hold), before), ((nodes, error), links))))| {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => {
                     implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate);
-                    *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, found });
+                    *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, before });
                 });
             });
         });
@@ -227,7 +228,7 @@ impl Cpu {
         s.share.resize(total, 0.0);
         s.share[n..].fill(0.0); // links name bodies' particles too
         s.hold.resize(n, 0.0);
-        s.found.resize(n, 0.0);
+        s.before.resize(n, 0.0);
         s.error.resize(n, 0.0);
         s.rate.resize(n, 0.0);
         s.flow.resize(total, [0.0; 4]);
@@ -236,10 +237,10 @@ impl Cpu {
         s.thrust.resize(self.state.bodies.body.len(), [DVec3::ZERO; 2]);
         s.added.resize(self.state.bodies.body.len(), [DVec3::ZERO; 2]);
         let all =
-            s.share[..n].par_iter_mut().zip(s.hold.par_iter_mut()).zip(s.found.par_iter_mut()).with_min_len(CHUNK);
-        all.enumerate().for_each(|(i, ((share, hold), found))| {
+            s.share[..n].par_iter_mut().zip(s.hold.par_iter_mut()).zip(s.before.par_iter_mut()).with_min_len(CHUNK);
+        all.enumerate().for_each(|(i, ((share, hold), before))| {
             *share = warm(i);
-            *found = *share;
+            *before = *share;
             *hold = crate::laws::implicit::hold(*share, limit);
         });
     }
@@ -254,7 +255,7 @@ impl Cpu {
         self.link::<false>(model, gravity);
         // what all but fluids' pressures and contacts make of bodies
         self.flow_of_bodies(advance);
-        self.implicit.divergence = self.solve(model, advance, Aim::Velocities);
+        self.implicit.divergence = self.solve(model, advance, Aim::Velocities, model.budget());
         if links::bodies(model).contains(&Kind::Static) {
             self.press(model, Kind::Static, gravity);
         }
@@ -289,7 +290,7 @@ impl Cpu {
         };
         let warm: Vec<f32> = (0..hold.len()).into_par_iter().with_min_len(CHUNK).map(begun).collect();
         self.prepare(model, |i| warm[i]);
-        self.implicit.pressure = self.solve(model, advance, Aim::Places);
+        self.implicit.pressure = self.solve(model, advance, Aim::Places, model.budget());
         let Implicit { places, share, hold, .. } = &mut self.implicit;
         places.clear();
         places.extend_from_slice(&share[..hold.len()]);
@@ -306,8 +307,8 @@ impl Cpu {
         }
     }
 
-    /// Rounds until the mean error is small; `flow` is then what the shares do, and `thrust` what they do to rigid bodies.
-    fn solve(&mut self, model: &Model, advance: Advance, aim: Aim) -> Solve {
+    /// Rounds until the mean error is small, at `most` so many; `flow` is then what the shares do, and `thrust` what they do to rigid bodies.
+    fn solve(&mut self, model: &Model, advance: Advance, aim: Aim, most: f64) -> Solve {
         let gravity = model.gravity_at(advance.end());
         let (n, dt) = (self.implicit.hold.len(), advance.dt as f32);
         if n == 0 || dt == 0.0 {
@@ -316,37 +317,41 @@ impl Cpu {
         self.errors(dt, aim);
         let tolerance = match aim {
             Aim::Velocities => model.solver.divergence_tolerance,
-            Aim::Places | Aim::Both => model.solver.tolerance,
+            Aim::Places | Aim::Both => model.tolerance(),
         };
         let scale = dt * dt;
         let limit = model.hold_limit();
-        let mut round = Round { omega: OMEGA / scale, scale, momentum: 0.0, limit };
-        let (mut said, mut pace, mut best) = (Solve::default(), 1.0f32, f64::INFINITY);
-        loop {
+        let compliance = if aim == Aim::Both { model.compliance() as f32 } else { 0.0 };
+        let mut round = Round { omega: model.factors.relaxation, scale, compliance, number: 0.0, limit };
+        let (mut said, mut best) = (Solve::default(), f64::INFINITY);
+        let done = loop {
             self.accelerate(model, advance, gravity, aim);
-            let next = 0.5 * (1.0 + (1.0 + 4.0 * pace * pace).sqrt());
-            round.momentum = (pace - 1.0) / next;
             let Said { error, against } = self.relax(round);
-            pace = if against > 0.0 { 1.0 } else { next };
+            round.number = if against > 0.0 { 0.0 } else { round.number + 1.0 };
             said.iterations += 1;
             said.residual = error / n as f64;
             if said.residual > WORSE * best {
                 // a body too light, or places too odd, for steps so long
-                (pace, round.omega) = (1.0, 0.5 * round.omega);
+                (round.number, round.omega) = (0.0, 0.5 * round.omega);
             }
             best = best.min(said.residual);
-            if said.residual <= tolerance || f64::from(said.iterations) >= model.solver.iterations {
-                break;
+            if said.residual <= tolerance || f64::from(said.iterations) >= most {
+                break said.residual <= tolerance;
             }
-        }
-        let Implicit { share, hold, found, error, rate, .. } = &mut self.implicit;
-        let all = share.par_iter_mut().zip(hold).zip(found).with_min_len(CHUNK);
-        all.zip(error).zip(rate).for_each(|((((share, hold), found), error), rate)| {
-            *share = *found;
-            *hold = crate::laws::implicit::hold(*found, limit);
+        };
+        // where the shares that pushed were good enough they stay
+        let Implicit { share, hold, before, error, rate, .. } = &mut self.implicit;
+        let all = share.par_iter_mut().zip(hold).zip(before).with_min_len(CHUNK);
+        all.zip(error).zip(rate).for_each(|((((share, hold), before), error), rate)| {
+            if done {
+                *share = *before;
+                *hold = crate::laws::implicit::hold(*before, limit);
+            }
             *error += scale * *rate;
         });
-        self.accelerate(model, advance, gravity, aim);
+        if !done {
+            self.accelerate(model, advance, gravity, aim);
+        }
         said
     }
 
@@ -397,7 +402,9 @@ impl Cpu {
         let p = &self.state.particles;
         let n = p.count[Kind::Fluid as usize];
         let mut sum: Vec<f32> = p.record[..n].par_iter().map(|r| r.share).collect();
-        self.prepare(model, |i| sum[i]);
+        // what corrected places in a shorter step would move them farther in a longer one
+        let warm = WARM * (advance.dt_before / advance.dt).powi(2).min(1.0) as f32;
+        self.prepare(model, |i| warm * sum[i]);
         let gravity = model.gravity_at(advance.end());
         let mut said = Solve::default();
         let mut total = vec![[DVec3::ZERO; 2]; self.state.bodies.body.len()];
@@ -412,13 +419,14 @@ impl Cpu {
                 let density = &self.state.particles.density[..n];
                 let over = density.par_chunks(CHUNK).map(|d| d.iter().map(|d| f64::from((d - 1.0).max(0.0))).sum());
                 said.residual = over.collect::<Vec<f64>>().iter().sum::<f64>() / n as f64;
-                let budget = f64::from(said.iterations) >= model.solver.iterations;
-                if said.residual <= model.solver.tolerance || budget || turn == TURNS {
+                let budget = f64::from(said.iterations) >= model.budget();
+                if said.residual <= model.tolerance() || budget || turn == TURNS {
                     break;
                 }
                 self.prepare(model, |_| 0.0);
             }
-            said.iterations += self.solve(model, advance, Aim::Both).iterations;
+            let left = model.budget() - f64::from(said.iterations);
+            said.iterations += self.solve(model, advance, Aim::Both, left).iterations;
             if links::bodies(model).contains(&Kind::Static) {
                 self.press(model, Kind::Static, gravity);
             }

@@ -35,6 +35,7 @@ struct Constants {
   step: vec4<f32>,        // courant, courant_force (implicit pressure: way of a step (m), factor of `pressed`), bound that does not
                           // change (s), stated dt (s) or 0
   rounds: vec4<f32>,      // implicit pressure: tolerances of places and of velocities, most rounds, dt of contacts (s)
+  relax: vec4<f32>,       // the same: Jacobi's factor, compliance (s^2/m^2)
   cells: vec4<u32>,       // cells on each axis; w: their number
   count: vec4<u32>,       // capacity of fluids, slots of rigid bodies, slots of all bodies, bodies
   more: vec4<u32>,        // parts of bodies, blocks of the scan, groups of the ledger, axes that are open (bits)
@@ -120,10 +121,12 @@ struct Clock {
 
 // How far implicit pressure is (E9): see interact/implicit.wgsl.
 struct Solve {
-  omega: f32, momentum: f32, pace: f32, best: f32,
+  omega: f32,              // Jacobi's factor
+  since: f32,              // rounds since the acceleration began
+  best: f32, unused: u32,
   residual: f32, iterations: u32, phase: u32, number: u32,
   said: vec4<f32>,         // rounds and residual of places, of velocities
-  turn: u32, stray: atomic<u32>, unused: vec2<u32>,
+  turn: u32, stray: atomic<u32>, other: vec2<u32>,
 }
 // What implicit pressure does to a body, and what it got from outside in this step. thrust: by the shares of a round; push: the
 // accelerations by it; steady: by fluids, as it stands for all parts of a step; added: what is in the force besides what was summed.

@@ -5,7 +5,7 @@ use crate::flock::FlockConstants;
 use crate::integrate::sources::DrainRegion;
 use crate::model::{DtBound, Model};
 use crate::scene::joint::JointModel;
-use crate::scene::{Force, Wall};
+use crate::scene::{Force, Pressure, Wall};
 use crate::state::{Body, HELD_CONTACTS, State};
 use bytemuck::{Pod, Zeroable};
 use glam::{DQuat, DVec3};
@@ -40,6 +40,7 @@ pub struct Constants {
     pub contact: V,
     pub step: V,
     pub rounds: V,
+    pub relax: V,
     pub cells: [u32; 4],
     pub count: [u32; 4],
     pub more: [u32; 4],
@@ -311,7 +312,8 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         tune: [f.laplacian, model.softening(), s.xsph as f32, s.shifting as f32],
         contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 1.0, model.hold_limit()],
         step: [steps[0] as f32, steps[1] as f32, least(&others), s.dt.unwrap_or(0.0) as f32],
-        rounds: [s.tolerance as f32, s.divergence_tolerance as f32, s.iterations as f32, least(&contact)],
+        rounds: [model.tolerance() as f32, s.divergence_tolerance as f32, model.budget() as f32, least(&contact)],
+        relax: [f.relaxation, if s.pressure == Pressure::Pbf { model.compliance() as f32 } else { 0.0 }, 0.0, 0.0],
         cells: [x, y, z, sizes.cells],
         count: [sizes.fluids, sizes.rigid, sizes.slots, sizes.bodies],
         more: [sizes.parts, sizes.blocks(), sizes.groups, open],

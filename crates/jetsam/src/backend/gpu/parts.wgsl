@@ -73,8 +73,8 @@ fn glide(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     own = p.said;
     var rates = vec4<f32>(0.0);
     if (MORTAL) { rates = rate[i]; }
-    // densities are found anew: in their place goes the share by which places begin at the next step
-    let a = vec4<f32>(push[i].xyz, select(spot[i].w, 0.0, PBF));
+    // forces are found anew: in their place goes the share by which places begin at the next step
+    let a = vec4<f32>(select(spot[i].w, 0.0, PBF), 0.0, 0.0, push[i].w);
     drifted[i] = Drifted(vec4<f32>(p.x, r.x.w), vec4<f32>(p.v, r.v.w), a, rates, info[i].x, info[i].y, vec2<u32>(0u));
   }
   say_put(g.y * n.x + g.x, l, own);
