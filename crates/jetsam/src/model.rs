@@ -89,7 +89,7 @@ pub struct Factors {
     pub g: f32,
     /// From the viscosity kernel's shape to `nabla^2 W` (1/m^(d+2)), exact alike.
     pub laplacian: f32,
-    /// Jacobi's factor in rounds of implicit pressure (E9): 0.9 over the largest eigenvalue that a resting lattice has.
+    /// Jacobi's factor in rounds of implicit pressure (E9): [`CAUTION`] over the largest eigenvalue that a resting lattice has.
     pub relaxation: f32,
     /// How much pressure over density one round of it puts against a compression of a resting lattice, times `dt^2 / dx^2`.
     pub reach: f32,
@@ -111,8 +111,8 @@ impl Factors {
             w_own: at(0.0),
             g: g as f32,
             laplacian: laplacian as f32,
-            relaxation: (0.9 / stiffness) as f32,
-            reach: (0.9 / stiffness / own) as f32,
+            relaxation: (CAUTION / stiffness) as f32,
+            reach: (CAUTION / stiffness / own) as f32,
         }
     }
 }
@@ -258,6 +258,9 @@ impl DtBound {
 
 /// A body moves no further between two looks at contacts than this fraction of the contact diameter: contacts see it coming.
 pub const TRAVEL: f64 = 0.1;
+/// Jacobi's factor times the largest eigenvalue on a resting lattice: places that are compressed by a third have eigenvalues that are larger so
+/// much, and rounds diverge where the product is above 1.
+const CAUTION: f64 = 0.65;
 /// Spacings that a particle pressed by its neighbours may swing in a step of DFSPH; a tank at rest is stable up to 0.6.
 const SWING: f64 = 0.35;
 /// The same in a step of PBF with a small budget of rounds; a dam and a tank are stable up to 0.47. Twice that where there is room for

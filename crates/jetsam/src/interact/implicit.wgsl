@@ -283,8 +283,8 @@ fn finish(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<
   let i = number(g, n, l, 128u);
   if (!ended() || i >= live_fluid()) { return; }
   let w = work[i];
-  // where the shares that pushed were good enough they stay
-  let share = select(spot[i].w, w.x, solve.residual <= tolerance());
+  // places that are good enough stay; velocities bear no neglect, and take what the last round made of the shares
+  let share = select(spot[i].w, w.x, PBF && solve.residual <= tolerance());
   spot[i].w = share;
   var sum = w.w;
   if (PBF) { sum = select(w.w, 0.0, solve.turn == 1u) + share; }

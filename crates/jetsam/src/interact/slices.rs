@@ -64,12 +64,6 @@ impl Slices {
         merge(&rows.among, &mut self.halo);
     }
 
-    /// Number of particles.
-    #[inline(always)]
-    pub fn len(&self) -> usize {
-        self.counts.len()
-    }
-
     /// Number of neighbours that particle `k` of the chunk has; among fluids it counts itself.
     #[inline(always)]
     pub fn count(&self, k: usize, kind: Kind) -> usize {
@@ -115,7 +109,7 @@ impl Slices {
     /// Slices with the particles of the chunk that each is about.
     #[inline(always)]
     pub fn each(&self) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
-        (0..self.slices.len()).map(|s| (s, LANES * s..self.len().min(LANES * s + LANES)))
+        (0..self.slices.len()).map(|s| (s, LANES * s..self.counts.len().min(LANES * s + LANES)))
     }
 
     /// Indices of the particles of slice `s`; lanes that are left over repeat the last.
@@ -123,7 +117,7 @@ impl Slices {
     pub fn members(&self, s: usize) -> [u32; LANES] {
         let mut out = [0; LANES];
         for l in 0..LANES {
-            out[l] = (self.first + (LANES * s + l).min(self.len() - 1)) as u32;
+            out[l] = (self.first + (LANES * s + l).min(self.counts.len() - 1)) as u32;
         }
         out
     }

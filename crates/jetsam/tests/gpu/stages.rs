@@ -145,7 +145,8 @@ fn stages_agree(text: &str, before: usize) {
             gpu.run(stage, &model, advance);
             assert!(gpu.fault().is_none(), "{:?}", gpu.fault());
             if stage != Stage::Drift || !evaluates {
-                compare(stage, cpu.download(), gpu.download(), 5e-6);
+                // some eighty roundings: sums of thirty pairs, in orders of their own
+                compare(stage, cpu.download(), gpu.download(), 1e-5);
             }
         }
         let (a, b) = (cpu.ledger(), gpu.ledger());

@@ -339,17 +339,18 @@ impl Cpu {
                 break said.residual <= tolerance;
             }
         };
-        // where the shares that pushed were good enough they stay
+        // places that are good enough stay; velocities bear no neglect, and take what the last round made of the shares
+        let stay = done && aim == Aim::Both;
         let Implicit { share, hold, before, error, rate, .. } = &mut self.implicit;
         let all = share.par_iter_mut().zip(hold).zip(before).with_min_len(CHUNK);
         all.zip(error).zip(rate).for_each(|((((share, hold), before), error), rate)| {
-            if done {
+            if stay {
                 *share = *before;
                 *hold = crate::laws::implicit::hold(*before, limit);
             }
             *error += scale * *rate;
         });
-        if !done {
+        if !stay {
             self.accelerate(model, advance, gravity, aim);
         }
         said
