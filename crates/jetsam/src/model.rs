@@ -89,7 +89,7 @@ pub struct Factors {
     pub g: f32,
     /// From the viscosity kernel's shape to `nabla^2 W` (1/m^(d+2)), exact alike.
     pub laplacian: f32,
-    /// Jacobi's factor in rounds of implicit pressure (E9): [`CAUTION`] over the largest eigenvalue that a resting lattice has.
+    /// Jacobi's factor in rounds of implicit pressure (E9): 0.65 over the largest eigenvalue that a resting lattice has.
     pub relaxation: f32,
     /// How much pressure over density one round of it puts against a compression of a resting lattice, times `dt^2 / dx^2`.
     pub reach: f32,
@@ -528,7 +528,7 @@ impl Model {
     /// The speed by which steps are bound (m/s): that of the fastest particle, and with implicit pressure that with which pressed
     /// particles swing about their places: `dt sqrt(p / rho) <= 0.35 dx` with DFSPH, which holds the directions of pairs for a step, 0.4 dx
     /// with PBF on a budget of less than 24 rounds, which has none left to find them anew. With more, PBF is bound by the weight of what lies
-    /// on the bottom alone: [`Model::longest_step`].
+    /// on the bottom alone: `longest_step`.
     pub fn bounding_speed(&self, ledger: &Ledger) -> f64 {
         ledger.speed.max(self.bounds_of_flow()[1] * ledger.pressed)
     }
