@@ -89,7 +89,7 @@ pub struct Factors {
     pub g: f32,
     /// From the viscosity kernel's shape to `nabla^2 W` (1/m^(d+2)), exact alike.
     pub laplacian: f32,
-    /// Jacobi's factor in rounds of implicit pressure (E9): 0.65 over the largest eigenvalue that a resting lattice has.
+    /// Jacobi's factor in rounds of PBF (E9): 0.65 over the largest eigenvalue that a resting lattice has.
     pub relaxation: f32,
     /// How much pressure over density one round of it puts against a compression of a resting lattice, times `dt^2 / dx^2`.
     pub reach: f32,
@@ -493,6 +493,11 @@ impl Model {
         let n = self.budget();
         let reach = 2.0 / 3.0 * n * (n + 1.0) * f64::from(self.factors.reach);
         (self.longest_step() / self.spacing).powi(2) / reach
+    }
+
+    /// Jacobi's factor in rounds of implicit pressure (E9); with DFSPH that of Bender and Koschier 2015.
+    pub fn relaxation(&self) -> f32 {
+        if self.solver.pressure == Pressure::Pbf { self.factors.relaxation } else { 0.5 }
     }
 
     /// Most rounds of a solve of implicit pressure, or of a step of PBF. PBF that may leave much makes as many as leave that in a tank at

@@ -3,8 +3,8 @@
 //!
 //! A round has two passes. [`accelerate`]: shares become accelerations of fluids, by the laws of E4 and E17.
 //! [`rates`] and [`relax`]: accelerations become rates of density, by the same vectors transposed, and shares are relaxed. The
-//! relaxation is Jacobi's, accelerated by Chebyshev polynomials of the fourth kind (Lottes 2023), begun anew whenever it runs against the
-//! descent. Called by the stages
+//! relaxation is Jacobi's, accelerated by Chebyshev polynomials of the fourth kind (PBF; Lottes 2023) or Nesterov's momentum (DFSPH), begun anew
+//! whenever it runs against the descent. Called by the stages
 //! `divergence` and `pressure`.
 
 use super::lanes::{LANES, Lanes, axes, load, store, vectors};
@@ -107,6 +107,8 @@ pub struct Round {
     pub compliance: f32,
     /// The number of the round since the acceleration began.
     pub number: f32,
+    /// Whether the acceleration is Chebyshev's (PBF) or Nesterov's (DFSPH).
+    pub chebyshev: bool,
     /// Pressure up to which gravity fades out between fluids and bodies (Pa).
     pub limit: f32,
 }
@@ -117,7 +119,7 @@ pub struct Shares<'a> {
     pub share: &'a mut [f32],
     /// Their [`implicit::hold`].
     pub hold: &'a mut [f32],
-    /// Those that pushed in the round before.
+    /// Those that pushed in the round before; of DFSPH what that round came to without momentum.
     pub before: &'a mut [f32],
 }
 
@@ -136,12 +138,13 @@ pub struct Said {
 pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rate: &[f32], shares: Shares) -> Said {
     let Shares { share, hold, before } = shares;
     let (kept, stride) = (implicit::carried(round.number), implicit::stride(round.number));
+    let momentum = implicit::momentum(round.number);
     let mut sums = [[0.0; LANES]; 2];
     for (s, nodes) in nodes.iter().enumerate() {
         let at = LANES * s;
         let read = |from: &[f32]| load(simd, from, at).to_array();
         let (error, rate, own, last) = (read(error), read(rate), read(share), read(before));
-        let (mut now, mut held) = ([0.0; LANES], [0.0; LANES]);
+        let (mut now, mut held, mut keep) = ([0.0; LANES], [0.0; LANES], own);
         let (mut change, mut against) = ([0.0; LANES], [0.0; LANES]);
         for l in 0..LANES {
             let compliance = round.compliance * nodes.inverse_rho[l];
@@ -149,9 +152,16 @@ pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rat
             let answer = round.scale * nodes.response[l] + compliance;
             let by = round.omega / answer;
             // what the share should still change by, in compression: of particles without pressure only the excess counts
-            change[l] = (implicit::relaxed(own[l], left, by, 0.0) - own[l]).abs() * answer / round.omega;
-            now[l] = implicit::relaxed(own[l], left, stride * by, kept * (own[l] - last[l]));
-            against[l] = left * (own[l] - now[l]);
+            let plain = implicit::relaxed(own[l], left, by, 0.0);
+            change[l] = (plain - own[l]).abs() * answer / round.omega;
+            if round.chebyshev {
+                now[l] = implicit::relaxed(own[l], left, stride * by, kept * (own[l] - last[l]));
+                against[l] = left * (own[l] - now[l]);
+            } else {
+                now[l] = (plain + momentum * (plain - last[l])).max(0.0);
+                against[l] = (own[l] - plain) * (plain - last[l]) * answer;
+                keep[l] = plain;
+            }
             held[l] = implicit::hold(now[l], round.limit);
         }
         let members = LANES.min(share.len() - at);
@@ -159,7 +169,7 @@ pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rat
             sums[0][l] += f64::from(change[l]);
             sums[1][l] += f64::from(against[l]);
         }
-        for (to, from) in [(&mut *before, own), (&mut *share, now), (&mut *hold, held)] {
+        for (to, from) in [(&mut *before, keep), (&mut *share, now), (&mut *hold, held)] {
             store(f32x16::load_array(simd, from), to, at);
         }
     }

@@ -234,11 +234,18 @@ fn relax_one(i: u32) -> vec2<f32> {
   let compliance = m.relax.y * nodes[i].solid.w;
   let left = w.y + scale * rate - compliance * share;
   let by = solve.omega / (scale * nodes[i].all.w + compliance);
-  let now = relaxed(share, left, stride(solve.since) * by, carried(solve.since) * (share - w.x));
-  work[i] = vec4<f32>(share, w.y, rate, w.w);
-  spot[i].w = now;
   // what the share should still change by, in compression: of particles without pressure only the excess counts
-  return vec2<f32>(abs(relaxed(share, left, by, 0.0) - share) / by, left * (share - now));
+  let plain = relaxed(share, left, by, 0.0);
+  let change = abs(plain - share) / by;
+  if (PBF) {
+    let now = relaxed(share, left, stride(solve.since) * by, carried(solve.since) * (share - w.x));
+    work[i] = vec4<f32>(share, w.y, rate, w.w);
+    spot[i].w = now;
+    return vec2<f32>(change, left * (share - now));
+  }
+  work[i] = vec4<f32>(plain, w.y, rate, w.w);
+  spot[i].w = max(plain + momentum(solve.since) * (plain - w.x), 0.0);
+  return vec2<f32>(change, (share - plain) * (plain - w.x) * (solve.omega / by));
 }
 
 fn tolerance() -> f32 { return select(m.rounds.x, m.rounds.y, !PBF && solve.number == VELOCITIES); }
@@ -283,8 +290,8 @@ fn finish(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<
   let i = number(g, n, l, 128u);
   if (!ended() || i >= live_fluid()) { return; }
   let w = work[i];
-  // places that are good enough stay; velocities bear no neglect, and take what the last round made of the shares
-  let share = select(spot[i].w, w.x, PBF && solve.residual <= tolerance());
+  // where the shares that pushed PBF are good enough they stay; DFSPH takes what the last round came to without momentum
+  let share = select(spot[i].w, w.x, !PBF || solve.residual <= tolerance());
   spot[i].w = share;
   var sum = w.w;
   if (PBF) { sum = select(w.w, 0.0, solve.turn == 1u) + share; }

@@ -28,6 +28,11 @@ fn stride(k: f32) -> f32 {
   return (8.0 * k + 4.0) / (2.0 * k + 3.0);
 }
 
+// Of round k of DFSPH: Nesterov's momentum, which bears light bodies; Chebyshev's rounds with them do not end.
+fn momentum(k: f32) -> f32 {
+  return k / (k + 3.0);
+}
+
 // Where the share that corrects a place begins: at half of what it was at the last step (Bender and Koschier 2015), but with no more than
 // moves the density by 3 % in a step dt, so that what was thrown together does not throw on.
 fn begun(before: f32, response: f32, dt: f32) -> f32 {

@@ -322,7 +322,8 @@ impl Cpu {
         let scale = dt * dt;
         let limit = model.hold_limit();
         let compliance = if aim == Aim::Both { model.compliance() as f32 } else { 0.0 };
-        let mut round = Round { omega: model.factors.relaxation, scale, compliance, number: 0.0, limit };
+        let mut round =
+            Round { omega: model.relaxation(), scale, compliance, number: 0.0, chebyshev: aim == Aim::Both, limit };
         let (mut said, mut best) = (Solve::default(), f64::INFINITY);
         let done = loop {
             self.accelerate(model, advance, gravity, aim);
@@ -339,12 +340,12 @@ impl Cpu {
                 break said.residual <= tolerance;
             }
         };
-        // places that are good enough stay; velocities bear no neglect, and take what the last round made of the shares
+        // where the shares that pushed PBF are good enough they stay; DFSPH takes what the last round came to without momentum
         let stay = done && aim == Aim::Both;
         let Implicit { share, hold, before, error, rate, .. } = &mut self.implicit;
         let all = share.par_iter_mut().zip(hold).zip(before).with_min_len(CHUNK);
         all.zip(error).zip(rate).for_each(|((((share, hold), before), error), rate)| {
-            if stay {
+            if stay || aim != Aim::Both {
                 *share = *before;
                 *hold = crate::laws::implicit::hold(*before, limit);
             }

@@ -313,7 +313,12 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 1.0, model.hold_limit()],
         step: [steps[0] as f32, steps[1] as f32, least(&others), s.dt.unwrap_or(0.0) as f32],
         rounds: [model.tolerance() as f32, s.divergence_tolerance as f32, model.budget() as f32, least(&contact)],
-        relax: [f.relaxation, if s.pressure == Pressure::Pbf { model.compliance() as f32 } else { 0.0 }, 0.0, 0.0],
+        relax: [
+            model.relaxation(),
+            if s.pressure == Pressure::Pbf { model.compliance() as f32 } else { 0.0 },
+            0.0,
+            0.0,
+        ],
         cells: [x, y, z, sizes.cells],
         count: [sizes.fluids, sizes.rigid, sizes.slots, sizes.bodies],
         more: [sizes.parts, sizes.blocks(), sizes.groups, open],
