@@ -68,6 +68,25 @@ pub struct Ledger {
 }
 
 impl Ledger {
+    /// Adds what was summed of a part of the particles or bodies. Means and [`Ledger::pressed`] are sums still; counts since the
+    /// beginning are left alone.
+    pub(crate) fn add(&mut self, part: &Self) {
+        self.speed = self.speed.max(part.speed);
+        self.acceleration = self.acceleration.max(part.acceleration);
+        self.momentum += part.momentum;
+        self.momentum_scale += part.momentum_scale;
+        self.external_force += part.external_force;
+        self.total_force += part.total_force;
+        self.force_scale += part.force_scale;
+        self.pressed += part.pressed;
+        self.kinetic += part.kinetic;
+        self.potential += part.potential;
+        self.density_error_mean += part.density_error_mean;
+        self.density_error_max = self.density_error_max.max(part.density_error_max);
+        self.neighbours += part.neighbours;
+        self.nonfinite += part.nonfinite;
+    }
+
     /// What was counted since the beginning, and nothing else.
     pub fn counts(&self) -> Self {
         Self {

@@ -462,12 +462,13 @@ impl Model {
         self.flocks = flocks;
     }
 
-    /// No vector `V_j grad_i W_ij` between particles is longer (1/m). Bodies' particles are at most a quarter larger than fluids'.
+    /// No vector of a link is longer (1/m): `V_j grad_i W_ij`, twice that to particles of bodies, which are at most a quarter larger than
+    /// fluids'.
     pub fn longest_link(&self) -> f32 {
         let kernel = self.kernel.force();
         let part = |k: u16| f32::from(k) / 256.0;
         let steepest = (1..=256).map(|k| (kernel.g(part(k)) * part(k)).abs()).fold(0.0, f32::max);
-        1.3 * (self.volume * self.support) as f32 * self.factors.g.abs() * steepest
+        2.6 * (self.volume * self.support) as f32 * self.factors.g.abs() * steepest
     }
 
     /// Spacings that the fastest particle moves in a step of implicit pressure (E29).
@@ -495,9 +496,11 @@ impl Model {
         (self.longest_step() / self.spacing).powi(2) / reach
     }
 
-    /// Jacobi's factor in rounds of implicit pressure (E9); with DFSPH that of Bender and Koschier 2015.
-    pub fn relaxation(&self) -> f32 {
-        if self.solver.pressure == Pressure::Pbf { self.factors.relaxation } else { 0.5 }
+    /// What gravity makes of an unheld fluid in a step, by `dt^2`: mean compression, for only what lies at the bottom is compressed (1/s^2;
+    /// E9). Infinite without gravity.
+    pub fn unheld(&self) -> f64 {
+        let g = self.gravity.length();
+        if g > 0.0 { 0.5 * g / self.depth.max(self.spacing) } else { f64::INFINITY }
     }
 
     /// Most rounds of a solve of implicit pressure, or of a step of PBF. PBF that may leave much makes as many as leave that in a tank at

@@ -325,9 +325,7 @@ impl Cpu {
             );
         }
         p.count[Kind::Fluid as usize] = living;
-        let order = std::mem::take(&mut self.cells[Kind::Fluid as usize].order);
-        self.sort_places(|k| order[k].load(Relaxed) as usize);
-        self.cells[Kind::Fluid as usize].order = order;
+        self.implicit.sort_places(&cells.order[..living]);
     }
 
     /// Sorts the slots of a kind of body and copies them to their places.
@@ -364,8 +362,28 @@ impl Cpu {
     }
 
     fn density(&mut self, model: &Model) {
-        let p = &mut self.state.particles;
-        let around = Around {
+        let n = self.state.particles.count[Kind::Fluid as usize];
+        let summed = model.solver.density == Density::Continuity;
+        let mut slices = std::mem::take(&mut self.slices);
+        let mut density = std::mem::take(if summed { &mut self.summed } else { &mut self.state.particles.density });
+        slices.resize_with(n.div_ceil(CHUNK), Slices::default);
+        density.resize(n.max(density.len()), 1.0);
+        let (around, level) = (self.around(model, false), self.level);
+        slices.par_iter_mut().zip(chunks_mut!(density, ..n)).enumerate().for_each(|(c, (slices, density))| {
+            let members = c * CHUNK..((c + 1) * CHUNK).min(n);
+            with_scratch(|scratch| {
+                dispatch!(level, simd => density::fluid_chunk(simd, scratch, model, around, members, slices, density));
+            });
+        });
+        self.slices = slices;
+        *(if summed { &mut self.summed } else { &mut self.state.particles.density }) = density;
+        self.find_bodies(model);
+    }
+
+    /// What a search for neighbours reads: with `contacts` of bodies' particles among each other, or else of all for fluids.
+    fn around<'a>(&'a self, model: &'a Model, contacts: bool) -> Around<'a> {
+        let p = &self.state.particles;
+        Around {
             grid: &model.grid,
             records: &p.record,
             places: &self.places,
@@ -373,23 +391,9 @@ impl Cpu {
             cells: self.cells.each_ref(),
             first: p.first,
             asleep: &self.asleep,
-            contacts: false,
-            reach: model.support as f32,
-        };
-        let (n, level) = (p.count[Kind::Fluid as usize], self.level);
-        self.slices.resize_with(n.div_ceil(CHUNK), Slices::default);
-        let density = match model.solver.density {
-            Density::Summation => &mut p.density,
-            Density::Continuity => &mut self.summed,
-        };
-        density.resize(n.max(density.len()), 1.0);
-        self.slices.par_iter_mut().zip(chunks_mut!(density, ..n)).enumerate().for_each(|(c, (slices, density))| {
-            let members = c * CHUNK..((c + 1) * CHUNK).min(n);
-            with_scratch(|scratch| {
-                dispatch!(level, simd => density::fluid_chunk(simd, scratch, model, around, members, slices, density));
-            });
-        });
-        self.find_bodies(model);
+            contacts,
+            reach: if contacts { self.contacts.list_reach(model).faces } else { model.support } as f32,
+        }
     }
 
     fn pressure(&mut self, model: &Model) {
@@ -605,19 +609,7 @@ impl Cpu {
         };
         let mut full = 0.0;
         for s in &self.sums {
-            total.speed = total.speed.max(s.speed);
-            total.acceleration = total.acceleration.max(s.acceleration);
-            total.momentum += s.momentum;
-            total.momentum_scale += s.momentum_scale;
-            total.external_force += s.external_force;
-            total.total_force += s.total_force;
-            total.force_scale += s.force_scale;
-            total.kinetic += s.kinetic;
-            total.potential += s.potential;
-            total.density_error_mean += s.density_error_mean;
-            total.density_error_max = total.density_error_max.max(s.density_error_max);
-            total.neighbours += s.neighbours;
-            total.pressed += s.pressed;
+            total.add(s);
             full += s.fluid as f64;
         }
         total.density_error_mean /= f64::max(full, 1.0);
@@ -633,16 +625,7 @@ impl Cpu {
             total.force_scale += added.length();
         }
         let of_bodies: Vec<Ledger> = b.body.par_chunks(CHUNK).map(|part| tally_bodies(model, part, gravity)).collect();
-        for s in &of_bodies {
-            total.momentum += s.momentum;
-            total.momentum_scale += s.momentum_scale;
-            total.external_force += s.external_force;
-            total.total_force += s.total_force;
-            total.force_scale += s.force_scale;
-            total.kinetic += s.kinetic;
-            total.potential += s.potential;
-            total.nonfinite += s.nonfinite;
-        }
+        of_bodies.iter().for_each(|s| total.add(s));
         for flock in &model.flocks {
             let Some(matter) = &flock.matter else { continue };
             let mass = f64::from(matter.mass);

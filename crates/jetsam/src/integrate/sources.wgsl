@@ -58,7 +58,7 @@ fn bear(@builtin(local_invocation_index) l: u32) {
     if (born && at < m.count.x) {
       let b = births[k];
       let fluid = u32(select(b.v.w, -b.v.w - 1.0, b.v.w < 0.0));
-      let density = vec4<f32>(0.0, 0.0, 0.0, select(0.0, 1.0, CONTINUITY));   // where it is not found anew
+      let density = vec4<f32>(0.0, 0.0, 0.0, 1.0);   // where it is not found anew
       drifted[at] = Drifted(vec4<f32>(place(k), m.per_cell.w), vec4<f32>(b.v.xyz, 0.0), density,
                             vec4<f32>(0.0, 0.0, clock.time + limit, 0.0), clock.next_id + made + place_of.x, fluid, vec2<u32>(0u));
     }

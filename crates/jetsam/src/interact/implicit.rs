@@ -3,12 +3,11 @@
 //!
 //! A round has two passes. [`accelerate`]: shares become accelerations of fluids, by the laws of E4 and E17.
 //! [`rates`] and [`relax`]: accelerations become rates of density, by the same vectors transposed, and shares are relaxed. The
-//! relaxation is Jacobi's, accelerated by Chebyshev polynomials of the fourth kind (PBF; Lottes 2023) or Nesterov's momentum (DFSPH), begun anew
-//! whenever it runs against the descent. Called by the stages
-//! `divergence` and `pressure`.
+//! relaxation is Jacobi's, accelerated by Chebyshev polynomials of the fourth kind (Lottes 2023), begun anew whenever it runs against the
+//! descent. Called by the stages `divergence` and `pressure`.
 
 use super::lanes::{LANES, Lanes, axes, load, store, vectors};
-use super::links::{Links, Nodes, Table};
+use super::links::{Links, Nodes, TWICE, Table};
 use crate::laws::implicit;
 use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
@@ -43,7 +42,7 @@ pub fn accelerate<S: Simd>(
         let (own, hold) = (load(simd, share, LANES * s), load(simd, hold, LANES * s));
         let inverse_rho = lanes(simd, &nodes.inverse_rho);
         for a in 0..3 {
-            let fluids = unit * sum[a] + own * lanes(simd, &nodes.own[a]);
+            let fluids = unit * sum[a] + own * lanes(simd, &nodes.all[TWICE][a]);
             sum[a] = zero - inverse_rho * (fluids + hold * lanes(simd, &nodes.pull[a]));
         }
         let rows = vectors(simd, sum);
@@ -56,13 +55,16 @@ pub fn accelerate<S: Simd>(
     }
 }
 
-/// `sum (u_i - u_j) . e_ij` of a chunk: the rate at which velocities `u` (m/s) compress (1/s), or accelerations alike.
+/// `sum (u_i - u_j) . e_ij` of a chunk: the rate at which velocities `u` (m/s) compress (1/s), or accelerations alike; `walls` says how
+/// often bodies and walls count ([`ONCE`](super::links::ONCE), [`TWICE`]).
 #[inline(always)]
+#[allow(clippy::too_many_arguments)] // as above
 pub fn rates<S: Simd>(
     simd: S,
     table: &mut Table,
     links: &Links,
     nodes: &[Nodes],
+    walls: usize,
     u: &[[f32; 4]],
     first: usize,
     out: &mut [f32],
@@ -84,7 +86,7 @@ pub fn rates<S: Simd>(
         let own = axes(rows);
         let mut all = f32x16::splat(simd, 0.0);
         for a in 0..3 {
-            all += lanes(simd, &nodes.all[a]) * own[a];
+            all += lanes(simd, &nodes.all[walls][a]) * own[a];
         }
         store(all - unit * sum, out, LANES * s);
     }
@@ -99,6 +101,8 @@ fn lanes<S: Simd>(simd: S, of: &Lanes) -> f32x16<S> {
 /// How shares are relaxed in one round.
 #[derive(Clone, Copy, Debug)]
 pub struct Round {
+    /// How often bodies and walls count: [`ONCE`](super::links::ONCE) or [`TWICE`], in rates.
+    pub walls: usize,
     /// Jacobi's factor.
     pub omega: f32,
     /// From rates of acceleration to what the error counts (s^2; 1 for the divergence).
@@ -107,8 +111,6 @@ pub struct Round {
     pub compliance: f32,
     /// The number of the round since the acceleration began.
     pub number: f32,
-    /// Whether the acceleration is Chebyshev's (PBF) or Nesterov's (DFSPH).
-    pub chebyshev: bool,
     /// Pressure up to which gravity fades out between fluids and bodies (Pa).
     pub limit: f32,
 }
@@ -119,7 +121,7 @@ pub struct Shares<'a> {
     pub share: &'a mut [f32],
     /// Their [`implicit::hold`].
     pub hold: &'a mut [f32],
-    /// Those that pushed in the round before; of DFSPH what that round came to without momentum.
+    /// Those that pushed in the round before.
     pub before: &'a mut [f32],
 }
 
@@ -130,6 +132,8 @@ pub struct Said {
     pub error: f64,
     /// Whether the change of shares runs against the descent, if positive.
     pub against: f64,
+    /// Sum of the errors with their signs.
+    pub bias: f64,
 }
 
 /// Relaxes the shares of a chunk. `error` is what is wrong without pressure, `rate` what the shares do about it; `share`
@@ -138,41 +142,35 @@ pub struct Said {
 pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rate: &[f32], shares: Shares) -> Said {
     let Shares { share, hold, before } = shares;
     let (kept, stride) = (implicit::carried(round.number), implicit::stride(round.number));
-    let momentum = implicit::momentum(round.number);
-    let mut sums = [[0.0; LANES]; 2];
+    let mut sums = [[0.0; LANES]; 3];
     for (s, nodes) in nodes.iter().enumerate() {
         let at = LANES * s;
         let read = |from: &[f32]| load(simd, from, at).to_array();
         let (error, rate, own, last) = (read(error), read(rate), read(share), read(before));
-        let (mut now, mut held, mut keep) = ([0.0; LANES], [0.0; LANES], own);
-        let (mut change, mut against) = ([0.0; LANES], [0.0; LANES]);
+        let (mut now, mut held) = ([0.0; LANES], [0.0; LANES]);
+        let (mut signed, mut against) = ([0.0; LANES], [0.0; LANES]);
         for l in 0..LANES {
             let compliance = round.compliance * nodes.inverse_rho[l];
             let left = error[l] + round.scale * rate[l] - compliance * own[l];
-            let answer = round.scale * nodes.response[l] + compliance;
+            let answer = round.scale * nodes.response[round.walls][l] + compliance;
             let by = round.omega / answer;
             // what the share should still change by, in compression: of particles without pressure only the excess counts
             let plain = implicit::relaxed(own[l], left, by, 0.0);
-            change[l] = (plain - own[l]).abs() * answer / round.omega;
-            if round.chebyshev {
-                now[l] = implicit::relaxed(own[l], left, stride * by, kept * (own[l] - last[l]));
-                against[l] = left * (own[l] - now[l]);
-            } else {
-                now[l] = (plain + momentum * (plain - last[l])).max(0.0);
-                against[l] = (own[l] - plain) * (plain - last[l]) * answer;
-                keep[l] = plain;
-            }
+            signed[l] = (plain - own[l]) * answer / round.omega;
+            now[l] = implicit::relaxed(own[l], left, stride * by, kept * (own[l] - last[l]));
+            against[l] = left * (own[l] - now[l]);
             held[l] = implicit::hold(now[l], round.limit);
         }
         let members = LANES.min(share.len() - at);
         for l in 0..members {
-            sums[0][l] += f64::from(change[l]);
+            sums[0][l] += f64::from(signed[l].abs());
             sums[1][l] += f64::from(against[l]);
+            sums[2][l] += f64::from(signed[l]);
         }
-        for (to, from) in [(&mut *before, keep), (&mut *share, now), (&mut *hold, held)] {
+        for (to, from) in [(&mut *before, own), (&mut *share, now), (&mut *hold, held)] {
             store(f32x16::load_array(simd, from), to, at);
         }
     }
-    let [error, against] = sums.map(|lanes| lanes.iter().sum());
-    Said { error, against }
+    let [error, against, bias] = sums.map(|lanes| lanes.iter().sum());
+    Said { error, against, bias }
 }

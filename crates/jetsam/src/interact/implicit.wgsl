@@ -11,8 +11,6 @@ const VELOCITIES: u32 = 0u;
 const PLACES: u32 = 1u;
 // An error so many times the least so far says that rounds do not converge.
 const WORSE: f32 = 10.0;
-// The part of the shares of the step before with which PBF begins.
-const WARM: f32 = 0.5;
 // How often PBF finds the vectors to neighbours anew in a step.
 const TURNS: u32 = 3u;
 
@@ -49,11 +47,11 @@ fn begin_turns() {
   solve.phase = ENDING;
 }
 
-var<workgroup> judged: array<vec2<f32>, 256>;
+var<workgroup> judged: array<vec3<f32>, 256>;
 // Sum of what all workgroups said.
-fn all_said(l: u32) -> vec2<f32> {
-  var sum = vec2<f32>(0.0);
-  for (var k = l; k < (live_fluid() + 127u) / 128u; k += 256u) { sum += said[k].xy; }
+fn all_said(l: u32) -> vec3<f32> {
+  var sum = vec3<f32>(0.0);
+  for (var k = l; k < (live_fluid() + 127u) / 128u; k += 256u) { sum += said[k].xyz; }
   judged[l] = sum;
   workgroupBarrier();
   for (var reach = 128u; reach > 0u; reach /= 2u) {
@@ -98,11 +96,18 @@ fn flow_of_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) 
 // Whether fluids move a body now: not while a scene settles.
 fn yields(b: Body) -> bool { return clock.drag == 0.0 && moves(b) && b.stated.w == 0.0; }
 
+// Sums of e and response for rates: with bodies and walls once where DFSPH corrects places, as densities answer; else twice, as pressures
+// push: only the transpose of what pushes makes rounds converge.
+fn seen(i: u32) -> vec4<f32> {
+  if (!PBF && solve.number == PLACES) { return nodes[i].once; }
+  return nodes[i].twice;
+}
+
 // How velocities (or accelerations) compress: sum (u_i - u_j) . e_ij.
 fn rate_of(i: u32) -> f32 {
   let x = spot[i].xyz;
   let limit = m.upper.w * m.upper.w;
-  var total = dot(nodes[i].all.xyz, flow[i].xyz);
+  var total = dot(seen(i).xyz, flow[i].xyz);
   for (var kind = FLUID; kind <= RIGID; kind += 1u) {
     if (kind == RIGID && !COUPLED_BY_PRESSURE) { continue; }
     var near = walk(x, kind);
@@ -111,7 +116,8 @@ fn rate_of(i: u32) -> f32 {
       let d = wrap(other.xyz - x);
       let r_sq = dot(d, d);
       if (r_sq >= limit) { continue; }
-      total -= dot(flow[near.at].xyz, link_to(d, r_sq, select(other.w, m.per_cell.w, kind == FLUID)));
+      // twice to bodies, as pressure pushes
+      total -= dot(flow[near.at].xyz, link_to(d, r_sq, select(2.0 * other.w, m.per_cell.w, kind == FLUID)));
     }
   }
   return total;
@@ -131,7 +137,7 @@ fn errors_of_places(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups
   if (clock.running == 0u || i >= first_static()) { return; }
   flow[i] = vec4<f32>(0.0);
   if (i >= live_fluid()) { return; }
-  let share = begun(before[i].x, nodes[i].all.w, clock.dt);
+  let share = begun(before[i].x, nodes[i].once.w, clock.dt);
   work[i] = vec4<f32>(share, work[i].y + max(push[i].w - 1.0, 0.0), 0.0, 0.0);
   spot[i].w = share;
 }
@@ -150,11 +156,11 @@ fn accelerate(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
     let d = wrap(other.xyz - own.xyz);
     let r_sq = dot(d, d);
     if (r_sq >= limit) { continue; }
-    total += (own.w + other.w) * link_to(d, r_sq, m.per_cell.w);
+    total += other.w * link_to(d, r_sq, m.per_cell.w);
   }
   let node = nodes[i];
-  total += 2.0 * own.w * node.solid.xyz + hold(own.w, m.contact.w) * node.pull.xyz;
-  flow[i] = vec4<f32>(-node.solid.w * total, 0.0);
+  total += own.w * node.twice.xyz + hold(own.w, m.contact.w) * node.pull.xyz;
+  flow[i] = vec4<f32>(-node.pull.w * total, 0.0);
 }
 
 // A round: force and torque of the shares on bodies, part by part in a fixed order.
@@ -216,7 +222,7 @@ fn push_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
 @compute @workgroup_size(128)
 fn relax(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let i = number(g, n, l, 128u);
-  var own = vec2<f32>(0.0);
+  var own = vec3<f32>(0.0);
   if (in_round() && i < live_fluid()) { own = relax_one(i); }
   judged[l] = own;
   workgroupBarrier();
@@ -224,28 +230,23 @@ fn relax(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     if (l < reach) { judged[l] += judged[l + reach]; }
     workgroupBarrier();
   }
-  if (l == 0u && in_round()) { said[g.y * n.x + g.x] = vec4<f32>(judged[0], 0.0, 0.0); }
+  if (l == 0u && in_round()) { said[g.y * n.x + g.x] = vec4<f32>(judged[0], 0.0); }
 }
-fn relax_one(i: u32) -> vec2<f32> {
+fn relax_one(i: u32) -> vec3<f32> {
   let rate = rate_of(i);
   let w = work[i];
   let share = spot[i].w;
   let scale = clock.dt * clock.dt;
-  let compliance = m.relax.y * nodes[i].solid.w;
+  let compliance = m.relax.y * nodes[i].pull.w;
   let left = w.y + scale * rate - compliance * share;
-  let by = solve.omega / (scale * nodes[i].all.w + compliance);
+  let by = solve.omega / (scale * seen(i).w + compliance);
   // what the share should still change by, in compression: of particles without pressure only the excess counts
   let plain = relaxed(share, left, by, 0.0);
-  let change = abs(plain - share) / by;
-  if (PBF) {
-    let now = relaxed(share, left, stride(solve.since) * by, carried(solve.since) * (share - w.x));
-    work[i] = vec4<f32>(share, w.y, rate, w.w);
-    spot[i].w = now;
-    return vec2<f32>(change, left * (share - now));
-  }
-  work[i] = vec4<f32>(plain, w.y, rate, w.w);
-  spot[i].w = max(plain + momentum(solve.since) * (plain - w.x), 0.0);
-  return vec2<f32>(change, (share - plain) * (plain - w.x) * (solve.omega / by));
+  let signed = (plain - share) / by;
+  let now = relaxed(share, left, stride(solve.since) * by, carried(solve.since) * (share - w.x));
+  work[i] = vec4<f32>(share, w.y, rate, w.w);
+  spot[i].w = now;
+  return vec3<f32>(abs(signed), left * (share - now), signed);
 }
 
 fn tolerance() -> f32 { return select(m.rounds.x, m.rounds.y, !PBF && solve.number == VELOCITIES); }
@@ -261,6 +262,7 @@ fn judge(@builtin(local_invocation_index) l: u32) {
     // a body too light, or places too odd, for steps so long
     solve.since = 0.0;
     solve.omega *= 0.5;
+    solve.best = residual;
   }
   solve.best = min(solve.best, residual);
   solve.iterations += 1u;
@@ -271,7 +273,9 @@ fn judge(@builtin(local_invocation_index) l: u32) {
   clock.rounds[solve.number] = max(clock.rounds[solve.number], solve.iterations);
   // the turns of PBF share its budget
   let rounds = select(f32(solve.iterations), solve.said.x, PBF);
-  if (residual <= tolerance() || rounds >= m.rounds.z) { solve.phase = DONE; }
+  let held = PBF || solve.number != VELOCITIES || abs(sum.z) <= f32(live_fluid()) * m.relax.z * clock.dt * clock.dt;
+  solve.small = select(0u, 1u, residual <= tolerance() && held);
+  if (solve.small == 1u || rounds >= m.rounds.z) { solve.phase = DONE; }
 }
 
 // After the rounds that were queued: on, or halt for more.
@@ -290,8 +294,8 @@ fn finish(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<
   let i = number(g, n, l, 128u);
   if (!ended() || i >= live_fluid()) { return; }
   let w = work[i];
-  // where the shares that pushed PBF are good enough they stay; DFSPH takes what the last round came to without momentum
-  let share = select(spot[i].w, w.x, !PBF || solve.residual <= tolerance());
+  // where the shares that pushed are good enough they stay
+  let share = select(spot[i].w, w.x, solve.small == 1u);
   spot[i].w = share;
   var sum = w.w;
   if (PBF) { sum = select(w.w, 0.0, solve.turn == 1u) + share; }

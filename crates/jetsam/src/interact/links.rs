@@ -187,17 +187,21 @@ fn counted(x: &mut Lanes, unit: f32, inverse: f32) -> [u32; LANES] {
 /// Sums over the neighbours of sixteen fluid particles.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Nodes {
-    /// `sum e_ij` over all neighbours (1/m).
-    pub all: [Lanes; 3],
-    /// `sum e_ij` once more over particles of bodies and walls, whose share is the particle's own (1/m).
-    pub own: [Lanes; 3],
+    /// `sum e_ij` over all neighbours (1/m), with bodies and walls [`ONCE`] or [`TWICE`].
+    pub all: [[Lanes; 3]; 2],
     /// `sum rho_i (g - a_b) . d_ib e_ib` over particles of bodies and walls (Pa/m).
     pub pull: [Lanes; 3],
     /// `1 / rho_0` (m^3/kg).
     pub inverse_rho: Lanes,
-    /// How fast the particle's density is driven down by its own share (1/(Pa s^2)).
-    pub response: Lanes,
+    /// How fast the particle's density is driven down by its own share (1/(Pa s^2)), with either.
+    pub response: [Lanes; 2],
 }
+
+/// Bodies and walls count once in the rates of densities when DFSPH corrects places: so densities answer in fact.
+pub const ONCE: usize = 0;
+/// They count twice in what pushes, as they show the particle's own pressure, and in the rates of all other solves: only the transpose of
+/// what pushes makes rounds converge (docs/physics.md, E9).
+pub const TWICE: usize = 1;
 
 /// What is read.
 #[derive(Clone, Copy)]
@@ -256,16 +260,17 @@ pub fn chunk<S: Simd, const DENSITY: bool>(
         links.ends.push(links.used as u32);
         for l in 0..LANES {
             let inverse_rho = 1.0 / rho[l];
-            let (mut own_dot_all, mut all_sq) = (0.0, 0.0);
+            nodes.inverse_rho[l] = inverse_rho;
+            let (mut once_sq, mut twice_sq, mut both) = (0.0, 0.0, 0.0);
             for a in 0..3 {
-                let all = sums.fluid[a][l] + sums.solid[a][l];
-                let own = all + sums.solid[a][l];
-                own_dot_all += own * all;
-                all_sq += all * all;
-                (nodes.all[a][l], nodes.own[a][l]) = (all, own);
+                let once = sums.fluid[a][l] + sums.solid[a][l];
+                let twice = once + sums.solid[a][l];
+                (once_sq, twice_sq, both) = (once_sq + once * once, twice_sq + twice * twice, both + once * twice);
+                (nodes.all[ONCE][a][l], nodes.all[TWICE][a][l]) = (once, twice);
             }
-            let response = implicit::response(own_dot_all, all_sq, inverse_rho, sums.pairs[l]);
-            (nodes.inverse_rho[l], nodes.response[l]) = (inverse_rho, response + floor * inverse_rho);
+            let pairs = sums.pairs[l] + floor * inverse_rho;
+            nodes.response[ONCE][l] = implicit::response(f32::max(both, once_sq), inverse_rho, pairs);
+            nodes.response[TWICE][l] = implicit::response(twice_sq, inverse_rho, pairs);
         }
         nodes.pull = sums.pull;
         if DENSITY {
@@ -313,8 +318,13 @@ fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
             }
         }
         let mut e = each_kernel!(model.kernel.force(), K => sixteen(K, factor, inverse, &d, &r_sq, &other.volume));
-        if kind != Kind::Static {
+        if FLUID {
             links.push(near.index, &mut e);
+        } else if kind == Kind::Rigid {
+            // twice, as pressure pushes: both are rounded alike
+            let mut twice = e.map(|e| e.map(|e| 2.0 * e));
+            links.push(near.index, &mut twice);
+            e = twice.map(|e| e.map(|e| 0.5 * e));
         }
         let sum = if FLUID { &mut sums.fluid } else { &mut sums.solid };
         for l in 0..LANES {

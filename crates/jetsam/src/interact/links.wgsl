@@ -1,8 +1,9 @@
 // What implicit solvers (E9) know of the neighbourhood of each fluid particle, the twin of links.rs: sums of the vectors
 // e_ij = V_j grad_i W_ij, which rounds make anew from places; and what shares do to particles of bodies.
 
-// all: sum of e over all neighbours (1/m); w: response. solid: over bodies and walls; w: 1/rho_0. pull: sum of rho (g - a_b) . d e.
-struct Node { all: vec4<f32>, solid: vec4<f32>, pull: vec4<f32> }
+// once, twice: sum of e over all neighbours (1/m) with bodies and walls once, as densities answer, and twice, as pressures push; w: response
+// of rates with either. pull: sum of rho (g - a_b) . d e over bodies and walls; w: 1/rho_0.
+struct Node { once: vec4<f32>, twice: vec4<f32>, pull: vec4<f32> }
 
 fn link_to(d: vec3<f32>, r_sq: f32, volume: f32) -> vec3<f32> {
   return link(volume, m.kernel.y * force_g(sqrt(r_sq) * m.origin.w)) * d;
@@ -64,18 +65,13 @@ fn link_one(i: u32) -> f32 {
       if (again) { weight += other.w * density_w(sqrt(r_sq) * m.origin.w); }
     }
   }
-  all += solid;
-  let alpha = response(dot(all + solid, all), dot(all, all), 1.0 / rho, pairs);
+  let once = all + solid;
+  let twice = once + solid;
   let floor = 1e-4 / (m.lower.w * m.lower.w * rho);
-  nodes[i] = Node(vec4<f32>(all, alpha + floor), vec4<f32>(solid, 1.0 / rho), vec4<f32>(pull, 0.0));
+  nodes[i] = Node(vec4<f32>(once, response(max(dot(once, twice), dot(once, once)), 1.0 / rho, pairs) + floor),
+                  vec4<f32>(twice, response(dot(twice, twice), 1.0 / rho, pairs) + floor), vec4<f32>(pull, 1.0 / rho));
   if (again) { push[i].w = m.kernel.x * weight; }
   return max(push[i].w - 1.0, 0.0);
-}
-
-// The part of the shares of the step before with which PBF begins: what corrected places in a shorter step would move them farther.
-fn warm() -> f32 {
-  let ratio = clock.dt_before / max(clock.dt, 1e-30);
-  return WARM * min(ratio * ratio, 1.0);
 }
 
 // Places, and where shares begin: from those of the step before. DFSPH begins with velocities.
@@ -85,7 +81,7 @@ fn seat(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u3
   if (clock.running == 0u || solve.phase == OVER) { return; }
   if (i < live_fluid()) {
     var share = records[i].v.w;
-    if (PBF) { share *= select(warm(), 0.0, solve.turn > 1u); }
+    if (PBF) { share *= select(recalled(clock.dt_before, clock.dt), 0.0, solve.turn > 1u); }
     spot[i] = vec4<f32>(records[i].x.xyz, share);
     work[i] = vec4<f32>(share, push[i].w - 1.0, 0.0, work[i].w);
     flow[i] = vec4<f32>(records[i].v.xyz, 0.0);

@@ -8,9 +8,9 @@ fn link(V_j: f32, G: f32) -> f32 {
 }
 
 // How fast, per unit of its own share, the density of i is driven down (1/(Pa s^2)); alpha of Bender and Koschier 2015,
-// eq. 8. fluids_sq = |sum e_ij|^2 over fluids with the part of bodies in it, pairs = sum |e_ij|^2 / rho_j over fluids.
-fn response(fluids_dot_all: f32, all_sq: f32, inverse_rho: f32, pairs: f32) -> f32 {
-  return max(fluids_dot_all, all_sq) * inverse_rho + pairs;
+// eq. 8. all_sq = |sum e_ij|^2, with bodies and walls as often as in what pushes and in the rates; pairs = sum |e_ij|^2 / rho_j over fluids.
+fn response(all_sq: f32, inverse_rho: f32, pairs: f32) -> f32 {
+  return all_sq * inverse_rho + pairs;
 }
 
 // A share after one more round: never negative, as fluids bear no tension. error = what D is above 1, or its rate above 0; went =
@@ -28,9 +28,12 @@ fn stride(k: f32) -> f32 {
   return (8.0 * k + 4.0) / (2.0 * k + 3.0);
 }
 
-// Of round k of DFSPH: Nesterov's momentum, which bears light bodies; Chebyshev's rounds with them do not end.
-fn momentum(k: f32) -> f32 {
-  return k / (k + 3.0);
+// The part of the shares of the last step, of dt_before, with which PBF begins: what corrected places in a shorter step would move them
+// farther in a longer one. Shares that errors are added to step after step control places by their integral: whatever rounds leave then
+// grows, unless at least half of them is forgotten.
+fn recalled(dt_before: f32, dt: f32) -> f32 {
+  let ratio = dt_before / max(dt, 1e-30);
+  return 0.5 * min(ratio * ratio, 1.0);
 }
 
 // Where the share that corrects a place begins: at half of what it was at the last step (Bender and Koschier 2015), but with no more than

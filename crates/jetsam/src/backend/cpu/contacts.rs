@@ -7,7 +7,7 @@ use super::{Cpu, GONE};
 use crate::integrate::{Advance, bodies, joints};
 use crate::interact::contacts::{Solid, Surfaces};
 use crate::interact::kept::{Kept, Reach};
-use crate::interact::neighbours::{Around, NeighbourChunk, with_scratch};
+use crate::interact::neighbours::{NeighbourChunk, with_scratch};
 use crate::interact::{CHUNK, density, forces};
 use crate::model::{CONTACT_SKIN, Model};
 use crate::state::{Bodies, Kind, Slips, State, Touch};
@@ -55,6 +55,11 @@ impl Contacts {
     /// The same for another state.
     pub fn anew(&self, bodies: &Bodies) -> Self {
         Self { skin: self.skin, held: bodies.slips.iter().map(|slips| !slips.is_empty()).collect(), ..Self::default() }
+    }
+
+    /// How far lists reach that are made now.
+    pub fn list_reach(&self, model: &Model) -> Reach {
+        self.reach.and(self.skin * model.contact_diameter)
     }
 
     /// Lists of slots that may touch.
@@ -151,7 +156,7 @@ impl Cpu {
                 Some((chunks + k / CHUNK, k % CHUNK))
             }
         };
-        let reach = self.contacts.reach.and(self.contacts.skin * model.contact_diameter);
+        let reach = self.contacts.list_reach(model);
         let kept = &mut self.contacts.kept;
         kept.renew(model, reach, b, found.each_ref().map(|f| &f[..]), &p.id, [rigid.clone(), fixed.clone()], place);
         // what is out of everybody's reach has slipped along nothing
@@ -168,20 +173,8 @@ impl Cpu {
 
     /// Neighbours of bodies' particles of a kind: each other for `contacts`, or else fluids.
     fn search(&self, model: &Model, kind: Kind, contacts: bool, chunks: &mut Vec<NeighbourChunk>) {
-        let p = &self.state.particles;
-        let reach = self.contacts.reach.and(self.contacts.skin * model.contact_diameter);
-        let around = Around {
-            grid: &model.grid,
-            records: &p.record,
-            places: &self.places,
-            owner: &p.owner,
-            cells: self.cells.each_ref(),
-            first: p.first,
-            asleep: &self.asleep,
-            contacts,
-            reach: if contacts { reach.faces } else { model.support } as f32,
-        };
-        let (level, segment) = (self.level, p.segment(kind));
+        let (around, level) = (self.around(model, contacts), self.level);
+        let segment = self.state.particles.segment(kind);
         chunks.resize_with(segment.len().div_ceil(CHUNK), NeighbourChunk::default);
         chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
             let first = segment.start + c * CHUNK;

@@ -10,18 +10,16 @@ use crate::interact::implicit::{self, Round, Said, Shares};
 use crate::interact::lanes::LANES;
 use crate::interact::links::{self, Links, Nodes};
 use crate::interact::neighbours::with_scratch;
+use crate::laws::implicit::{begun, recalled};
 use crate::ledger::Solve;
 use crate::model::Model;
 use crate::scene::Wall;
-use crate::state::{Body, Kind, State};
+use crate::state::{Body, Kind, Record, State};
 use fearless_simd::dispatch;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// The part of the shares of the last step with which PBF begins. Shares that errors are added to step after step control places by
-/// their integral: whatever rounds leave then grows, unless at least half of them is forgotten (docs/physics.md, E9).
-const WARM: f32 = 0.5;
 /// How often PBF finds the vectors to neighbours anew in a step.
 const TURNS: u32 = 3;
 /// An error so many times the least so far says that rounds do not converge.
@@ -35,7 +33,7 @@ pub(super) struct Implicit {
     share: Vec<f32>,
     hold: Vec<f32>,
     before: Vec<f32>,
-    /// Shares (Pa) that corrected places at the last step, in the order of today.
+    /// Shares (Pa) with which DFSPH corrected places at the last step, in the order of today.
     places: Vec<f32>,
     /// Accelerations, or velocities (m/s), of fluids and rigid bodies' particles.
     pub(super) flow: Vec<[f32; 4]>,
@@ -62,6 +60,15 @@ impl Implicit {
     pub(super) fn of(bodies: usize) -> Self {
         Self { added: vec![[DVec3::ZERO; 2]; bodies], ..Self::default() }
     }
+
+    /// Shares that corrected places go with their particles when fluids change places: from where each comes.
+    pub(super) fn sort_places(&mut self, order: &[AtomicU32]) {
+        if !self.places.is_empty() {
+            let old = std::mem::take(&mut self.places);
+            let from = |place: &AtomicU32| old.get(place.load(Relaxed) as usize).copied().unwrap_or(0.0);
+            self.places = order.par_iter().with_min_len(CHUNK).map(from).collect();
+        }
+    }
 }
 
 /// What one solve is about.
@@ -73,6 +80,13 @@ enum Aim {
     Places,
     /// Places now, and the velocities that lead there.
     Both,
+}
+
+impl Aim {
+    /// How often bodies and walls count in rates.
+    fn walls(self) -> usize {
+        if self == Aim::Places { links::ONCE } else { links::TWICE }
+    }
 }
 
 impl Cpu {
@@ -210,13 +224,17 @@ impl Cpu {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => {
-                    implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate);
+                    implicit::rates(simd, table, links, nodes, round.walls, flow, c * CHUNK, rate);
                     *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, before });
                 });
             });
         });
         said.iter()
-            .fold(Said::default(), |sum, s| Said { error: sum.error + s.error, against: sum.against + s.against })
+            .fold(Said::default(), |sum, s| Said {
+                error: sum.error + s.error,
+                against: sum.against + s.against,
+                bias: sum.bias + s.bias,
+            })
     }
 
     /// Makes room for arrays of all particles; shares begin where `warm` says.
@@ -286,7 +304,7 @@ impl Cpu {
         let Implicit { places, nodes, hold, .. } = &self.implicit;
         let begun = |i: usize| {
             let before = places.get(i).copied().unwrap_or(0.0);
-            crate::laws::implicit::begun(before, nodes[i / LANES].response[i % LANES], advance.dt as f32)
+            begun(before, nodes[i / LANES].response[links::ONCE][i % LANES], advance.dt as f32)
         };
         let warm: Vec<f32> = (0..hold.len()).into_par_iter().with_min_len(CHUNK).map(begun).collect();
         self.prepare(model, |i| warm[i]);
@@ -302,7 +320,7 @@ impl Cpu {
         for (slot, record) in b.record[..b.rigid_slots].iter().enumerate() {
             let at = self.place[slot].load(Relaxed);
             if at != GONE {
-                p.record[at as usize] = crate::state::Record { share: p.record[at as usize].share, ..*record };
+                p.record[at as usize] = Record { share: p.record[at as usize].share, ..*record };
             }
         }
     }
@@ -319,39 +337,40 @@ impl Cpu {
             Aim::Velocities => model.solver.divergence_tolerance,
             Aim::Places | Aim::Both => model.tolerance(),
         };
+        let unheld = if aim == Aim::Velocities { model.unheld() * advance.dt.powi(2) } else { f64::INFINITY };
         let scale = dt * dt;
         let limit = model.hold_limit();
         let compliance = if aim == Aim::Both { model.compliance() as f32 } else { 0.0 };
-        let mut round =
-            Round { omega: model.relaxation(), scale, compliance, number: 0.0, chebyshev: aim == Aim::Both, limit };
+        let omega = model.factors.relaxation;
+        let mut round = Round { walls: aim.walls(), omega, scale, compliance, number: 0.0, limit };
         let (mut said, mut best) = (Solve::default(), f64::INFINITY);
-        let done = loop {
+        let small = loop {
             self.accelerate(model, advance, gravity, aim);
-            let Said { error, against } = self.relax(round);
+            let Said { error, against, bias } = self.relax(round);
             round.number = if against > 0.0 { 0.0 } else { round.number + 1.0 };
             said.iterations += 1;
             said.residual = error / n as f64;
             if said.residual > WORSE * best {
                 // a body too light, or places too odd, for steps so long
-                (round.number, round.omega) = (0.0, 0.5 * round.omega);
+                (round.number, round.omega, best) = (0.0, 0.5 * round.omega, said.residual);
             }
             best = best.min(said.residual);
-            if said.residual <= tolerance || f64::from(said.iterations) >= most {
-                break said.residual <= tolerance;
+            let small = said.residual <= tolerance && bias.abs() <= n as f64 * unheld;
+            if small || f64::from(said.iterations) >= most {
+                break small;
             }
         };
-        // where the shares that pushed PBF are good enough they stay; DFSPH takes what the last round came to without momentum
-        let stay = done && aim == Aim::Both;
         let Implicit { share, hold, before, error, rate, .. } = &mut self.implicit;
         let all = share.par_iter_mut().zip(hold).zip(before).with_min_len(CHUNK);
         all.zip(error).zip(rate).for_each(|((((share, hold), before), error), rate)| {
-            if stay || aim != Aim::Both {
+            // where the shares that pushed are good enough they stay
+            if small {
                 *share = *before;
                 *hold = crate::laws::implicit::hold(*before, limit);
             }
             *error += scale * *rate;
         });
-        if !stay {
+        if !small {
             self.accelerate(model, advance, gravity, aim);
         }
         said
@@ -374,7 +393,7 @@ impl Cpu {
             if aim == Aim::Velocities {
                 with_scratch(|scratch| {
                     let table = &mut scratch.places;
-                    dispatch!(level, simd => implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate));
+                    dispatch!(level, simd => implicit::rates(simd, table, links, nodes, aim.walls(), flow, c * CHUNK, rate));
                 });
             }
             for ((error, rate), density) in error.iter_mut().zip(rate).zip(density) {
@@ -388,25 +407,14 @@ impl Cpu {
         });
     }
 
-    /// Shares that corrected places go with their particles when fluids change places: from where each comes.
-    pub(super) fn sort_places(&mut self, order: impl Fn(usize) -> usize + Sync) {
-        let old = std::mem::take(&mut self.implicit.places);
-        if !old.is_empty() {
-            let n = self.state.particles.count[Kind::Fluid as usize];
-            let sorted = (0..n).into_par_iter().with_min_len(CHUNK).map(|k| old.get(order(k)).copied().unwrap_or(0.0));
-            self.implicit.places = sorted.collect();
-        }
-    }
-
     /// Stage `pressure` of PBF: particles moved until no density is above that of rest. Rounds are made for the vectors to neighbours
     /// as they are; once particles have moved these are found anew, and what is still wrong is corrected in turn.
     pub(super) fn correct(&mut self, model: &Model, advance: Advance) {
         let p = &self.state.particles;
         let n = p.count[Kind::Fluid as usize];
         let mut sum: Vec<f32> = p.record[..n].par_iter().map(|r| r.share).collect();
-        // what corrected places in a shorter step would move them farther in a longer one
-        let warm = WARM * (advance.dt_before / advance.dt).powi(2).min(1.0) as f32;
-        self.prepare(model, |i| warm * sum[i]);
+        let kept = recalled(advance.dt_before as f32, advance.dt as f32);
+        self.prepare(model, |i| kept * sum[i]);
         let gravity = model.gravity_at(advance.end());
         let mut said = Solve::default();
         let mut total = vec![[DVec3::ZERO; 2]; self.state.bodies.body.len()];

@@ -314,9 +314,9 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         step: [steps[0] as f32, steps[1] as f32, least(&others), s.dt.unwrap_or(0.0) as f32],
         rounds: [model.tolerance() as f32, s.divergence_tolerance as f32, model.budget() as f32, least(&contact)],
         relax: [
-            model.relaxation(),
+            f.relaxation,
             if s.pressure == Pressure::Pbf { model.compliance() as f32 } else { 0.0 },
-            0.0,
+            model.unheld().min(1e30) as f32,
             0.0,
         ],
         cells: [x, y, z, sizes.cells],
