@@ -496,11 +496,11 @@ impl Model {
         (self.longest_step() / self.spacing).powi(2) / reach
     }
 
-    /// What gravity makes of an unheld fluid in a step, by `dt^2`: mean compression, for only what lies at the bottom is compressed (1/s^2;
-    /// E9). Infinite without gravity.
+    /// Most that rounds of DFSPH for velocities may leave of compression on the whole, by `dt^2` (1/s^2; E9): half of what gravity makes of a
+    /// fluid that nothing holds, `g / (2 depth)`, for then only what lies at the bottom is compressed. Infinite without gravity.
     pub fn unheld(&self) -> f64 {
         let g = self.gravity.length();
-        if g > 0.0 { 0.5 * g / self.depth.max(self.spacing) } else { f64::INFINITY }
+        if g > 0.0 { 0.25 * g / self.depth.max(self.spacing) } else { f64::INFINITY }
     }
 
     /// Most rounds of a solve of implicit pressure, or of a step of PBF. PBF that may leave much makes as many as leave that in a tank at

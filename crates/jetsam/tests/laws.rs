@@ -1,7 +1,7 @@
 //! The laws against formulas and tables of the literature.
 
 use jetsam::laws::kernel::{Kernel, KernelSet};
-use jetsam::laws::{contact, field, fluid};
+use jetsam::laws::{contact, field, fluid, implicit};
 use std::f64::consts::PI;
 
 /// Integral of `f(r)` over the ball (disc) of radius `support`, by Simpson's rule.
@@ -232,4 +232,23 @@ fn fields_have_their_formulas() {
     // Rankine vortex about z: at twice the core's radius half the speed, across the radius
     let u = field::vortex([2.0, 0.0, 5.0], [0.0; 3], [0.0, 0.0, 1.0], 4.0, 1.0, 1.0);
     assert!((u.y - 2.0).abs() < 1e-6 && u.x.abs() < 1e-6 && u.z.abs() < 1e-6);
+}
+
+/// Half of the share of the last step, but no more than moves the density, which a share drives down by `response dt^2`, by 3 % (E9).
+#[test]
+fn corrections_of_places_begin_with_what_moves_a_density_by_three_per_cent_at_most() {
+    let (response, dt) = (40.0, 2e-3);
+    let moves = |share: f32| share * response * dt * dt;
+    assert_eq!(implicit::begun(20.0, response, dt), 10.0);
+    let capped = implicit::begun(1e6, response, dt);
+    assert!((moves(capped) - 0.03).abs() < 1e-6, "{}", moves(capped));
+}
+
+/// PBF begins with half of the last shares; a correction of places is `share dt^2`, so in a longer step with less by the square (E9).
+#[test]
+fn shares_of_a_shorter_step_count_less_in_a_longer_one() {
+    assert_eq!(implicit::recalled(1e-3, 1e-3), 0.5);
+    assert_eq!(implicit::recalled(2e-3, 1e-3), 0.5);
+    assert_eq!(implicit::recalled(1e-3, 2e-3), 0.125);
+    assert_eq!(implicit::recalled(0.0, 1e-3), 0.0);
 }

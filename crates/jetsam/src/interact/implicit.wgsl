@@ -96,10 +96,10 @@ fn flow_of_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) 
 // Whether fluids move a body now: not while a scene settles.
 fn yields(b: Body) -> bool { return clock.drag == 0.0 && moves(b) && b.stated.w == 0.0; }
 
-// Sums of e and response for rates: with bodies and walls once where DFSPH corrects places, as densities answer; else twice, as pressures
-// push: only the transpose of what pushes makes rounds converge.
+// Sums of e and response for rates: with bodies and walls twice, as pressures push, for only the transpose of what pushes makes rounds
+// converge; PBF's once, as densities answer.
 fn seen(i: u32) -> vec4<f32> {
-  if (!PBF && solve.number == PLACES) { return nodes[i].once; }
+  if (PBF) { return nodes[i].once; }
   return nodes[i].twice;
 }
 
@@ -116,8 +116,8 @@ fn rate_of(i: u32) -> f32 {
       let d = wrap(other.xyz - x);
       let r_sq = dot(d, d);
       if (r_sq >= limit) { continue; }
-      // twice to bodies, as pressure pushes
-      total -= dot(flow[near.at].xyz, link_to(d, r_sq, select(2.0 * other.w, m.per_cell.w, kind == FLUID)));
+      let volume = select(select(2.0, 1.0, PBF) * other.w, m.per_cell.w, kind == FLUID);
+      total -= dot(flow[near.at].xyz, link_to(d, r_sq, volume));
     }
   }
   return total;
@@ -137,7 +137,7 @@ fn errors_of_places(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups
   if (clock.running == 0u || i >= first_static()) { return; }
   flow[i] = vec4<f32>(0.0);
   if (i >= live_fluid()) { return; }
-  let share = begun(before[i].x, nodes[i].once.w, clock.dt);
+  let share = begun(before[i].x, nodes[i].twice.w, clock.dt);
   work[i] = vec4<f32>(share, work[i].y + max(push[i].w - 1.0, 0.0), 0.0, 0.0);
   spot[i].w = share;
 }

@@ -16,7 +16,7 @@ use super::slices::{Own, Slices, splat};
 use crate::laws::implicit;
 use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
-use crate::scene::Coupling;
+use crate::scene::{Coupling, Pressure};
 use crate::state::{Body, Kind, Record};
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x4, f32x16, i32x16};
@@ -73,6 +73,8 @@ impl Link {
 pub struct Links {
     /// What a component of a vector counts (1/m).
     pub unit: f32,
+    /// How often particles of bodies count in rates.
+    movers: f32,
     links: Vec<Link>,
     used: usize,
     /// End of the links of each slice.
@@ -197,10 +199,10 @@ pub struct Nodes {
     pub response: [Lanes; 2],
 }
 
-/// Bodies and walls count once in the rates of densities when DFSPH corrects places: so densities answer in fact.
+/// Bodies and walls count once in PBF's rates of densities: so densities answer in fact.
 pub const ONCE: usize = 0;
-/// They count twice in what pushes, as they show the particle's own pressure, and in the rates of all other solves: only the transpose of
-/// what pushes makes rounds converge (docs/physics.md, E9).
+/// They count twice in what pushes, as they show the particle's own pressure, and in DFSPH's rates: only the transpose of what pushes
+/// makes rounds converge (docs/physics.md, E9).
 pub const TWICE: usize = 1;
 
 /// What is read.
@@ -242,6 +244,7 @@ pub fn chunk<S: Simd, const DENSITY: bool>(
     let floor = 1e-4 / (model.spacing * model.spacing) as f32;
     let at_center = model.kernel.density().w(0.0);
     links.clear(slices, model.longest_link());
+    links.movers = if model.solver.pressure == Pressure::Dfsph { 2.0 } else { 1.0 };
     for ((s, members), nodes) in slices.each().zip(nodes) {
         let own = Own::slice(simd, input.records, slices, s);
         let mut rho = [model.fluids[0].density; LANES];
@@ -321,10 +324,9 @@ fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
         if FLUID {
             links.push(near.index, &mut e);
         } else if kind == Kind::Rigid {
-            // twice, as pressure pushes: both are rounded alike
-            let mut twice = e.map(|e| e.map(|e| 2.0 * e));
-            links.push(near.index, &mut twice);
-            e = twice.map(|e| e.map(|e| 0.5 * e));
+            let mut seen = e.map(|e| e.map(|e| links.movers * e));
+            links.push(near.index, &mut seen);
+            e = seen.map(|e| e.map(|e| e / links.movers));
         }
         let sum = if FLUID { &mut sums.fluid } else { &mut sums.solid };
         for l in 0..LANES {
@@ -470,7 +472,7 @@ mod tests {
     #[test]
     fn links_lead_to_the_neighbours() {
         let halo = vec![[40, 90, 40], [200, 230, 150], [1000, 1100, 920]];
-        let mut links = Links { unit: 0.5, links: vec![Link::default()], used: 0, ends: vec![1], halo: halo.clone() };
+        let mut links = Links { unit: 0.5, movers: 1.0, links: vec![Link::default()], used: 0, ends: vec![1], halo: halo.clone() };
         let index: [u32; LANES] = std::array::from_fn(|l| [45, 89, 200, 229, 1000, 1099][l % 6]);
         let mut e: [Lanes; 3] = std::array::from_fn(|a| std::array::from_fn(|l| (l as f32 - 7.3) * (a as f32 - 0.9)));
         links.push(&index, &mut e);

@@ -85,7 +85,7 @@ enum Aim {
 impl Aim {
     /// How often bodies and walls count in rates.
     fn walls(self) -> usize {
-        if self == Aim::Places { links::ONCE } else { links::TWICE }
+        if self == Aim::Both { links::ONCE } else { links::TWICE }
     }
 }
 
@@ -304,7 +304,7 @@ impl Cpu {
         let Implicit { places, nodes, hold, .. } = &self.implicit;
         let begun = |i: usize| {
             let before = places.get(i).copied().unwrap_or(0.0);
-            begun(before, nodes[i / LANES].response[links::ONCE][i % LANES], advance.dt as f32)
+            begun(before, nodes[i / LANES].response[links::TWICE][i % LANES], advance.dt as f32)
         };
         let warm: Vec<f32> = (0..hold.len()).into_par_iter().with_min_len(CHUNK).map(begun).collect();
         self.prepare(model, |i| warm[i]);
