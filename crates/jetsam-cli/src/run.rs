@@ -114,8 +114,6 @@ fn describe(s: &Summary, folder: &Path, drawn: bool) -> String {
         100.0 * s.divergence_residual
     );
     let back = if s.put_back > 0 { format!(" ({} put back from walls)", s.put_back) } else { String::new() };
-    let given_up =
-        if s.forgotten_slips > 0 { format!(" ({} slips forgotten)", s.forgotten_slips) } else { String::new() };
     let left = if s.left > 0 { format!(" ({} left through open sides)", s.left) } else { String::new() };
     let drawn = if drawn { ", pictures drawn meanwhile" } else { "" };
     let wall = format!("{} in {}{drawn}", seconds(s.time), seconds(s.wall_s));
@@ -128,7 +126,7 @@ fn describe(s: &Summary, folder: &Path, drawn: bool) -> String {
             format!("mean {:.2} %, max {:.2} %", 100.0 * s.density_error_mean, 100.0 * s.density_error_max),
         ),
         ("lost particles", format!("{}{left}{back}", s.lost)),
-        ("fast contacts", format!("{}{given_up}", s.fast_contacts)),
+        ("fast contacts", s.fast_contacts.to_string()),
         ("momentum residual", format!("{:.1e}", s.momentum_residual)),
         ("state hash", s.state_hash.clone()),
         ("output", folder.display().to_string()),

@@ -67,6 +67,7 @@ impl Frame {
         self.record.clear();
         self.push.clear();
         self.tag.clear();
+        let mut forces = state.forces_on_bodies();
         for kind in Kind::ALL {
             let range = p.segment(kind);
             self.first[kind as usize] = self.record.len() as u32;
@@ -81,7 +82,7 @@ impl Frame {
                 // force over the particle's part of the body's mass
                 let body = &bodies[p.owner[i] as usize];
                 let share = (body.slots.len() as f64 / body.mass) as f32;
-                let [x, y, z] = p.push[i].map(|f| share * f);
+                let [x, y, z] = forces.next().unwrap_or_default().map(|f| share * f);
                 [x, y, z, 1.0]
             }));
             self.tag.extend(range.map(|i| [p.id[i], p.owner[i]]));

@@ -60,9 +60,6 @@ pub struct Ledger {
     /// Times a body came so deep into another, or moved so far in a step while touching one, that it could have passed
     /// through, since the beginning (E12).
     pub fast_contacts: u64,
-    /// Times a contact that rubs was given up by a particle that remembers as many as it can, since the beginning (E13).
-    /// The CPU backend counts.
-    pub forgotten_slips: u64,
     /// Particles found with a position that is not finite, since the beginning.
     pub nonfinite: u64,
 }
@@ -95,7 +92,6 @@ impl Ledger {
             drained: self.drained,
             lost: self.lost,
             fast_contacts: self.fast_contacts,
-            forgotten_slips: self.forgotten_slips,
             nonfinite: self.nonfinite,
             put_back: self.put_back,
             ..Self::default()

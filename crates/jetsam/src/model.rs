@@ -13,8 +13,8 @@ use std::f64::consts::PI;
 
 /// Contacts are looked for within so many contact diameters: farther than a pair parts or meets in half a step.
 pub const CONTACT_REACH: f64 = 1.5;
-/// Lists of contacts reach so many contact diameters farther, and hold until something has moved by half of that.
-pub const CONTACT_SKIN: f64 = 0.3;
+/// Lists of contacts reach so many contact diameters farther at most, and hold until something has moved by half of that.
+pub const CONTACT_SKIN: f64 = 0.5;
 
 /// Constants of a world.
 #[derive(Clone, Debug)]

@@ -151,7 +151,6 @@ impl Recorder {
             left: ledger.left,
             lost: ledger.lost + ledger.rigid_lost as u64,
             fast_contacts: ledger.fast_contacts,
-            forgotten_slips: ledger.forgotten_slips,
             nonfinite: ledger.nonfinite,
             put_back: ledger.put_back,
             density_error_mean: self.density_error_sum / self.frames.max(1) as f64,
@@ -195,8 +194,6 @@ pub struct Summary {
     pub lost: u64,
     /// As in [`FrameStats`].
     pub fast_contacts: u64,
-    /// Times a contact that rubs was given up by a particle that remembers as many as it can (E13).
-    pub forgotten_slips: u64,
     /// As in [`FrameStats`].
     pub nonfinite: u64,
     /// Times implicit pressure did not keep a fluid particle out of a solid side of the domain, so that it was put back.

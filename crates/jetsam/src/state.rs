@@ -3,8 +3,13 @@
 //! Particles live in three segments of the same arrays, one per [`Kind`]; inside a segment they are sorted by
 //! cell, ties by id, by the stage `cells`. Each array says which stage writes it.
 
+mod contacts;
+
+pub use contacts::Contacts;
+pub(crate) use contacts::{FACED, LIVE, Rows, SLOT};
+
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3, Vec3};
 use std::ops::Range;
 
 /// What a particle belongs to. The kind decides which laws apply (see [`crate::laws`]).
@@ -40,65 +45,14 @@ pub struct Record {
     pub share: f32,
 }
 
-/// Of what the force on a particle of a body consists. Written by forces.
+/// Of what the force on a particle of a body consists, contacts aside. Written by forces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Touch {
     /// Force by fluids (N).
     pub fluid: [f32; 3],
-    /// Force by other bodies and walls (N).
-    pub contact: [f32; 3],
-    /// Couple of the contact forces (N m): they act at the middle between two particles, not at this one's centre.
-    pub couple: [f32; 3],
-    /// Which of the chunk's slips are its own, counted from 1; 0 where friction holds nothing.
-    pub slips: u32,
-    /// Particles it touches.
-    pub contacts: u32,
-    /// Their parts, summed: beside each other the particles of a face share one contact.
-    pub sharers: f32,
-    /// Of these, how many are so deep that they would pass through.
-    pub deep: u32,
-    /// Of these, how many rub but have no place among the slips it remembers ([`HELD_CONTACTS`]).
-    pub forgotten: u32,
-}
-
-/// Contacts whose slip one particle remembers: those that bear most.
-pub const HELD_CONTACTS: usize = 8;
-
-/// Slips of the contacts of one particle of a body, E13: how far what it touches has moved along it, as far as friction holds.
-/// A contact of two is kept by the particle of the lower slot, or by the one that is awake.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Slips {
-    /// Slot of the other particle; [`Slips::NONE`] where there is no contact.
-    pub with: [u32; HELD_CONTACTS],
-    /// Slip (m) of the other particle relative to this one.
-    pub slip: [[f32; 3]; HELD_CONTACTS],
-}
-
-impl Slips {
-    /// Stands for no contact.
-    pub const NONE: u32 = u32::MAX;
-
-    /// The slip of the contact with a slot (m).
-    #[inline(always)]
-    pub fn of(&self, slot: u32) -> Option<[f32; 3]> {
-        // all at once: where it stands is not to be foretold
-        let found = (0..HELD_CONTACTS).fold(0u32, |found, k| found | u32::from(self.with[k] == slot) << k);
-        if found == 0 { None } else { Some(self.slip[found.trailing_zeros() as usize % HELD_CONTACTS]) }
-    }
-
-    /// Whether there is no contact.
-    #[inline(always)]
-    pub fn is_empty(&self) -> bool {
-        self.with[0] == Self::NONE
-    }
-}
-
-impl Default for Slips {
-    fn default() -> Self {
-        Self { with: [Self::NONE; HELD_CONTACTS], slip: [[0.0; 3]; HELD_CONTACTS] }
-    }
+    /// Force by agents of flocks (N). Written by agents.
+    pub agents: [f32; 3],
 }
 
 /// All particles. Arrays are indexed alike; `segment` tells which range belongs to a kind.
@@ -106,7 +60,8 @@ impl Default for Slips {
 pub struct Particles {
     /// What pairs read. Permuted by cells.
     pub record: Vec<Record>,
-    /// Fluid: acceleration (m/s^2). Bodies' particles: force (N). Written by forces.
+    /// Fluid: acceleration (m/s^2). Bodies' particles: force (N); on the CPU without that of contacts, see [`State::forces_on_bodies`].
+    /// Written by forces.
     pub push: Vec<[f32; 3]>,
     /// Acceleration of the step before (m/s^2), fluid only. Kept by cells for the kick.
     pub push_before: Vec<[f32; 3]>,
@@ -299,8 +254,8 @@ pub struct Bodies {
     pub normal: Vec<[f32; 3]>,
     /// The same in world axes. Written by drift; rigid slots only, static ones are constant.
     pub facing: Vec<[f32; 3]>,
-    /// Slips of the contacts of each rigid slot, E13; empty where no body rubs. Written by bodies.
-    pub slips: Vec<Slips>,
+    /// Contacts of their particles (E10-E13). Written by density and forces.
+    pub contacts: Contacts,
     /// Impulse on bodies by joints to what forces do not move, in this step (N s). Written by drift and kick.
     pub joint_impulse: DVec3,
     /// Force on bodies by springs to what forces do not move (N). Written by bodies.
@@ -346,4 +301,15 @@ pub struct State {
     pub bodies: Bodies,
     /// Agents of flocks.
     pub agents: Agents,
+}
+
+impl State {
+    /// Forces on the particles of bodies (N), contacts included: of rigid, then of static ones, in their order.
+    pub fn forces_on_bodies(&self) -> impl Iterator<Item = [f32; 3]> {
+        let (p, b) = (&self.particles, &self.bodies);
+        let mut by_contacts = vec![Vec3::ZERO; b.owner.len()];
+        b.contacts.push(&mut by_contacts, |slot| b.body[b.owner[slot] as usize].asleep);
+        let all = p.segment(Kind::Rigid).chain(p.segment(Kind::Static));
+        all.map(move |i| (Vec3::from(p.push[i]) + by_contacts[p.id[i] as usize]).to_array())
+    }
 }

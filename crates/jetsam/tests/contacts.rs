@@ -3,7 +3,9 @@
 mod common;
 
 use common::{space, world};
+use glam::DVec3;
 use jetsam::World;
+use jetsam::state::Kind;
 use std::f64::consts::PI;
 
 /// A one-particle body.
@@ -200,4 +202,53 @@ fn derived_constants_give_the_restitution_asked_for() {
         // they meet at 1 m/s, twice the largest speed of any one: twice the overlap allowed at most
         assert!(c.overlap < 2.0 * world.model().solver.contact_overlap * r, "{}", c.overlap);
     }
+}
+
+#[test]
+fn what_a_body_feels_is_what_its_particles_feel() {
+    // forces without friction act along the lines of centres: torques are those of the forces on particles, also on a bar that
+    // reaches round more than half of a periodic axis and is touched from both sides
+    let mut w = world(
+        "[domain]\nmin = [0, 0, 0]\nmax = [0.4, 0.3, 0.6]\nwalls = [\"periodic\", \"solid\", \"solid\"]\n[resolution]\nspacing = 0.02\n\
+         [solver]\nsurface = \"spheres\"\nsleep = 0\n\
+         [[rigid]]\nname = \"bar\"\nshape = { box = { min = [-0.15, -0.03, -0.03], max = [0.15, 0.03, 0.03] } }\ndensity = 500\nfriction = 0\n\
+         position = [0.3, 0.15, 0.06]\n\
+         [[rigid]]\nname = \"brick\"\nshape = { box = { min = [-0.03, -0.03, -0.03], max = [0.03, 0.03, 0.03] } }\ndensity = 500\nfriction = 0\n\
+         position = [0.05, 0.05, 0.2]\ncopies = { count = 24, grid = { columns = [4, 3], step = [0.1, 0.1, 0.1] }, tumble = true }\n",
+    );
+    let (mut touched, mut far) = (0, false);
+    for _ in 0..8 {
+        w.advance(w.time() + 0.05, |_, _| true);
+        let s = w.state();
+        let mut felt = vec![[DVec3::ZERO; 2]; s.bodies.body.len()];
+        let slots =
+            s.particles.segment(Kind::Rigid).chain(s.particles.segment(Kind::Static)).map(|i| s.particles.id[i]);
+        for (slot, f) in slots.zip(s.forces_on_bodies()) {
+            let (slot, f) = (slot as usize, DVec3::from(f.map(f64::from)));
+            let k = s.bodies.owner[slot] as usize;
+            felt[k][0] += f;
+            felt[k][1] += (s.bodies.body[k].q * s.bodies.offset[slot]).cross(f);
+        }
+        for (body, [force, torque]) in s.bodies.body.iter().zip(felt).filter(|(b, _)| !b.is_static()) {
+            let size = body.force_contact.length();
+            assert!(
+                (force - body.force_contact).length() <= 1e-5 * size,
+                "{}: {force} {}",
+                body.name,
+                body.force_contact
+            );
+            let off = (torque - body.torque_contact).length();
+            assert!(off <= 1e-5 * (0.2 * size + torque.length()), "{}: {torque} {}", body.name, body.torque_contact);
+            touched += body.contacts;
+        }
+        // some touch the bar across the seam, farther from its centre than half the period
+        let x = |slot: u32| f64::from(s.bodies.record[slot as usize].x[0]);
+        let bar = &s.bodies.body[0];
+        let across = |[a, b]: [u32; 2]| {
+            let between = bar.slots.contains(&(a as usize)) && (b as usize) < s.bodies.rigid_slots;
+            between && (x(b) - bar.x.x).abs() > 0.2
+        };
+        far |= s.bodies.contacts.touching().any(across);
+    }
+    assert!(touched > 100 && far, "{touched} contacts");
 }

@@ -146,7 +146,7 @@ fn a_particle_holds_contacts_that_slip_in_different_directions() {
         let k_t = 2.0 / 7.0 * 1e5;
         let friction = 0.1 * G / 2.0 * 15f64.to_radians().tan();
         for (slot, side) in [(0, 1.0), (1, -1.0)] {
-            let slip = w.state().bodies.slips[slot].of(2).unwrap().map(|s| f64::from(s) * k_t);
+            let slip = w.state().bodies.contacts.slip(slot, 2).unwrap().map(|s| f64::from(s) * k_t);
             assert!((slip[0].hypot(slip[2]) / friction - 1.0).abs() < 0.01, "{slip:?} {friction}");
             assert!(side * slip[0] > 0.0);
         }

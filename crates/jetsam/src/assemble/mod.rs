@@ -19,7 +19,7 @@ use crate::interact::cells::Grid;
 use crate::mesh::Mesh;
 use crate::model::{CONTACT_REACH, CONTACT_SKIN, Model};
 use crate::scene::{Density, Force, Scene, Shape, Wall};
-use crate::state::{Bodies, Body, Particles, Record, Slips, State, Touch};
+use crate::state::{Bodies, Body, Particles, Record, State, Touch};
 use bodies::NewBody;
 use fluid::Drop;
 use glam::{DMat3, DVec3};
@@ -225,7 +225,6 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
             bodies.rigid_slots = bodies.offset.len();
         }
     }
-    bodies.slips = vec![Slips::default(); if model.rubs() { bodies.rigid_slots } else { 0 }];
     let n = fluid.len();
     // the fluid's segment has places for fluid to come
     let room = n + if model.sources.is_empty() { 0 } else { n / 2 + 1024 };

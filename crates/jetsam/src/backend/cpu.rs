@@ -142,7 +142,7 @@ impl Backend for Cpu {
             next_id: p.next_id(),
             body_radius: bodies.body.iter().map(far).collect(),
             implicit: Implicit::of(bodies.body.len()),
-            contacts: self.contacts.anew(&state.bodies),
+            contacts: self.contacts.anew(),
             state,
             ..Self::default()
         };
@@ -154,6 +154,32 @@ impl Backend for Cpu {
     }
 
     fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
+        // as one job: a thread of the pool hands out work to the others without waiting to be woken up
+        rayon::scope(|_| self.work(stage, model, advance));
+    }
+
+    fn download(&self) -> &State {
+        &self.state
+    }
+
+    fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+}
+
+/// Place of a body's particle that is outside the domain.
+const GONE: u32 = u32::MAX;
+
+/// Chunks of an array over a range.
+macro_rules! chunks_mut {
+    ($array:expr, $range:expr) => {
+        $array[$range].par_chunks_mut(CHUNK)
+    };
+}
+
+impl Cpu {
+    /// Runs a stage.
+    fn work(&mut self, stage: Stage, model: &Model, advance: Advance) {
         let solver = model.solver.pressure;
         match stage {
             Stage::Drift if model.implicit() => self.glide(model, advance),
@@ -185,26 +211,6 @@ impl Backend for Cpu {
         }
     }
 
-    fn download(&self) -> &State {
-        &self.state
-    }
-
-    fn ledger(&self) -> &Ledger {
-        &self.ledger
-    }
-}
-
-/// Place of a body's particle that is outside the domain.
-const GONE: u32 = u32::MAX;
-
-/// Chunks of an array over a range.
-macro_rules! chunks_mut {
-    ($array:expr, $range:expr) => {
-        $array[$range].par_chunks_mut(CHUNK)
-    };
-}
-
-impl Cpu {
     fn drift(&mut self, model: &Model, advance: Advance) {
         let State { particles: p, bodies: b, .. } = &mut self.state;
         let fluid = p.segment(Kind::Fluid);
@@ -392,7 +398,9 @@ impl Cpu {
             first: p.first,
             asleep: &self.asleep,
             contacts,
-            reach: if contacts { self.contacts.list_reach(model).faces } else { model.support } as f32,
+            // what sleeps does not search
+            once: contacts && !self.asleep.contains(&true),
+            reach: if contacts { self.contacts.list_reach().faces } else { model.support } as f32,
         }
     }
 
@@ -467,19 +475,8 @@ impl Cpu {
     /// Forces on fluids, then on bodies' particles.
     fn forces(&mut self, model: &Model, advance: Advance) {
         self.calm();
-        let State { particles: p, bodies: b, .. } = &mut self.state;
-        let surfaces = Surfaces {
-            slot: &p.id,
-            kept: self.contacts.lists(),
-            record: &b.record,
-            owner: &b.owner,
-            facing: &b.facing,
-            slips: &b.slips,
-            held: &self.contacts.held,
-            solid: &self.contacts.solid,
-            stirred: &self.stirred,
-            reach: self.contacts.reach,
-        };
+        let State { particles: p, .. } = &mut self.state;
+        let surfaces = Surfaces { solid: &self.contacts.solid, stirred: &self.stirred };
         let input = forces::Input {
             model,
             records: &p.record,
@@ -510,6 +507,7 @@ impl Cpu {
         for kind in [Kind::Rigid, Kind::Static] {
             self.push_slots(model, advance, kind, true);
         }
+        self.touch(model, advance.dt);
     }
 
     fn agents(&mut self, model: &Model, advance: Advance) {
@@ -596,7 +594,6 @@ impl Cpu {
             lost: self.ledger.lost,
             nonfinite: self.ledger.nonfinite,
             fast_contacts: self.ledger.fast_contacts,
-            forgotten_slips: self.ledger.forgotten_slips,
             put_back: self.ledger.put_back,
             external_force: self.held + b.joint_force,
             external_impulse: if model.implicit() { self.implicit.impulse } else { b.joint_impulse }

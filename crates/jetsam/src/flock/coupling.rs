@@ -73,7 +73,7 @@ impl Coupling {
             } else {
                 let touch = &mut particles.touch[p.particle - bodies_first];
                 *push = (Vec3::from(*push) + p.force).to_array();
-                touch.contact = (Vec3::from(touch.contact) + p.force).to_array();
+                touch.agents = (Vec3::from(touch.agents) + p.force).to_array();
                 stirred[owner as usize].store(true, Relaxed);
             }
         }

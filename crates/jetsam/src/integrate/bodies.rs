@@ -1,10 +1,11 @@
 //! Rigid bodies: the sum of forces and torques (E18), drift and kick (E20), and particles that follow (E21).
 
 use super::{Advance, joints};
+use crate::interact::kept::Felt;
 use crate::model::Model;
 use crate::scene::Integrator;
 use crate::scene::motion::Path;
-use crate::state::{Bodies, Body, Record, Touch};
+use crate::state::{Bodies, Body, Record};
 use glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -208,9 +209,6 @@ pub struct Part {
 struct Sum {
     force: [DVec3; 3],
     torque: [DVec3; 3],
-    contacts: u32,
-    sharers: f64,
-    deep: u32,
 }
 
 impl Sum {
@@ -219,9 +217,6 @@ impl Sum {
             self.force[k] += other.force[k];
             self.torque[k] += other.torque[k];
         }
-        self.contacts += other.contacts;
-        self.sharers += other.sharers;
-        self.deep += other.deep;
     }
 }
 
@@ -289,34 +284,32 @@ pub fn thrust<'a>(
     });
 }
 
-/// E18: force and torque of every body that has slots in a range from what they feel, in the order of slots; gravity (m/s^2) is added to
-/// the whole body. `after` is given each of these bodies, and whether it was [`Body::deep`] before; what it returns is added.
-pub fn sum<'a>(
+/// E18: force and torque of every body that has slots in a range from what its particles feel, in the order of slots, and from its contacts;
+/// gravity (m/s^2) is added to the whole body. `felt` tells of a slot the whole force (N) but that of contacts, the part of it that fluids
+/// exert, and that of agents. `after` is given each of these bodies, and whether it was [`Body::deep`] before; what it returns is added.
+#[allow(clippy::too_many_arguments)] // one caller
+pub fn sum(
     bodies: &mut Bodies,
     parts: &mut [Part],
     slots: Range<usize>,
-    felt: impl Fn(usize) -> Option<(&'a [f32; 3], &'a Touch)> + Sync,
+    felt: Option<impl Fn(usize) -> Option<[[f32; 3]; 3]> + Sync>,
+    contacts: impl Fn(usize) -> Felt + Sync,
     gravity: DVec3,
     dimensions: u32,
     after: impl Fn(&mut Body, bool) -> u64 + Sync,
 ) -> u64 {
     let offset = &bodies.offset;
-    let double = |f: [f32; 3]| DVec3::from(f.map(f64::from));
     let sums = Sums::new(&bodies.body, parts, &slots, |body, slots| {
-        let axes = DMat3::from_quat(body.q);
         let mut sum = Sum::default();
+        let Some(felt) = &felt else { return sum };
+        let axes = DMat3::from_quat(body.q);
         for slot in slots {
-            let Some((push, touch)) = felt(slot) else { continue };
+            let Some(felt) = felt(slot) else { continue };
             let arm = axes * offset[slot];
-            for (k, f) in [*push, touch.fluid, touch.contact].into_iter().map(double).enumerate() {
+            for (k, f) in felt.into_iter().map(|f| DVec3::from(f.map(f64::from))).enumerate() {
                 sum.force[k] += f;
                 sum.torque[k] += arm.cross(f);
             }
-            sum.torque[0] += double(touch.couple);
-            sum.torque[2] += double(touch.couple);
-            sum.contacts += touch.contacts;
-            sum.sharers += f64::from(touch.sharers);
-            sum.deep += touch.deep;
         }
         sum
     });
@@ -326,7 +319,11 @@ pub fn sum<'a>(
         if body.asleep || !slots.contains(&body.slots.start) {
             return after(body, before);
         }
-        let mut sum = sums.over(k, body);
+        let (mut sum, contacts) = (sums.over(k, body), contacts(k));
+        for part in [0, 2] {
+            sum.force[part] += contacts.force;
+            sum.torque[part] += contacts.torque;
+        }
         if dimensions == 2 {
             sum.torque = sum.torque.map(|t| DVec3::new(0.0, t.y, 0.0));
         }
@@ -338,10 +335,10 @@ pub fn sum<'a>(
         }
         if !body.is_static() {
             body.force += body.mass * gravity;
-            body.sharers = sum.sharers as f32;
+            body.sharers = contacts.sharers as f32;
         }
-        body.contacts = sum.contacts;
-        body.deep = sum.deep > 0;
+        body.contacts = contacts.contacts;
+        body.deep = contacts.deep > 0;
         after(body, before)
     });
     each.sum()

@@ -1,23 +1,22 @@
-//! Contacts of particles of different bodies (E10-E13), seen from one of them; called by the stage `forces`.
+//! Contacts of particles of different bodies (E10-E13), each pair once; called by the stage `forces`.
 //!
-//! In: the lists of slots that may touch, surface normals, slips of contacts, what contacts know of bodies. Out: a [`Touch`]
-//! for each particle: force, the couple of forces that act where two particles touch, what was counted; and [`Slips`], what
-//! friction remembers of each contact.
+//! In: the lists of slots that may touch, surface normals, slips of contacts, what contacts know of bodies. Out: force and slip of each
+//! contact, and for each two bodies that may touch what the first feels ([`Runs`]).
 //!
-//! Those of a list that come near enough are gathered, sixteen pairs of whatever particles at a time, and the laws are worked
-//! out in lanes; what comes out is added particle by particle, in the order of lists.
+//! Those of a list that come near enough are gathered, sixteen pairs of whatever particles at a time: 32 numbers of each are laid side by
+//! side and transposed, the laws are worked out in lanes, without branches, and what comes out is transposed back and added pair by pair,
+//! in the order of lists.
 
-use super::forces::Input;
-use super::kept::{FACED, Kept, Reach};
-use super::lanes::{LANES, Lanes};
+use super::kept::{Reach, Runs, apart};
+use super::lanes::{Block, Indices, LANES, Lanes, transpose};
 use super::pairs::wrap;
 use crate::integrate::sleep::{self, Rest};
 use crate::laws::contact;
 use crate::model::{ContactModel, Model, TANGENTIAL, TANGENTIAL_DAMPING};
 use crate::scene::{Damping, Surface};
-use crate::state::{Body, HELD_CONTACTS, Record, Slips, Touch};
+use crate::state::{Bodies, Body, FACED, LIVE, Rows, SLOT};
 use fearless_simd::Simd;
-use glam::Vec3;
+use glam::{DMat3, DVec3, Vec3};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// What contacts know of a body.
@@ -34,6 +33,8 @@ pub struct Solid {
     sharers: f32,
     /// Angular velocity (rad/s).
     spin: Vec3,
+    /// Centre of mass (m).
+    x: DVec3,
     rest: Rest,
 }
 
@@ -50,39 +51,23 @@ impl Solid {
             damping: contact.damping,
             sharers: body.sharers,
             spin: body.omega.as_vec3(),
+            x: body.x,
             rest: sleep::rest(body),
         }
     }
 }
 
-/// What contacts read.
+/// Bodies as those see them that touch them.
 #[derive(Clone, Copy)]
 pub struct Surfaces<'a> {
-    /// Slot of each particle of a body, by particle.
-    pub slot: &'a [u32],
-    /// Slots that may touch.
-    pub kept: &'a Kept,
-    /// What particles show to pairs, by slot.
-    pub record: &'a [Record],
-    /// Body of each slot.
-    pub owner: &'a [u32],
-    /// Outward normals in world axes, by slot: see [`crate::state::Bodies::facing`].
-    pub facing: &'a [[f32; 3]],
-    /// Slips of contacts, by slot of rigid bodies; empty where no body rubs.
-    pub slips: &'a [Slips],
-    /// Whether there are any, slot by slot.
-    pub held: &'a [bool],
-    /// Bodies.
+    /// What contacts know of them.
     pub solid: &'a [Solid],
     /// Set for bodies that something restless touches.
     pub stirred: &'a [AtomicBool],
-    /// Pairs farther apart neither touch nor meet in half a step.
-    pub reach: Reach,
 }
 
 impl Surfaces<'_> {
     /// Notes that bodies `a` and `b` touch: what is restless keeps the other awake.
-    #[inline(always)]
     fn stir(&self, a: u32, b: u32) {
         for (one, other) in [(a as usize, b as usize), (b as usize, a as usize)] {
             if self.solid[one].rest == Rest::Restless && self.solid[other].rest != Rest::Restless {
@@ -91,29 +76,10 @@ impl Surfaces<'_> {
         }
     }
 
-    /// Whether the first of a pair is the one that remembers its slip. One that sleeps remembers what it knew before.
-    #[inline(always)]
-    fn keeps(&self, pair: Pair) -> bool {
-        pair.slot[0] < pair.slot[1] || self.asleep(pair.body[1])
-    }
-
     /// Whether a body sleeps.
     #[inline(always)]
-    pub fn asleep(&self, body: u32) -> bool {
+    fn asleep(&self, body: u32) -> bool {
         self.solid[body as usize].rest == Rest::Asleep
-    }
-
-    /// The slip of a contact up to now (m), seen from the first of the pair: the exact opposite of what the other sees.
-    #[inline(always)]
-    fn slip(&self, pair: Pair) -> [f32; 3] {
-        let of = |one: usize, other: usize| match self.held.get(one) {
-            Some(true) => self.slips[one].of(other as u32),
-            _ => None,
-        };
-        let [own, other] = pair.slot;
-        let mine = if self.keeps(pair) { of(own, other) } else { None };
-        let theirs = || of(other, own).filter(|_| own > other || self.asleep(pair.body[1])).map(|s| s.map(|x| -x));
-        mine.or_else(theirs).unwrap_or_default()
     }
 
     /// Notes that fluid is near body `b`.
@@ -125,173 +91,272 @@ impl Surfaces<'_> {
     }
 }
 
+/// What contacts read.
+#[derive(Clone, Copy)]
+pub struct Input<'a> {
+    /// Constants.
+    pub model: &'a Model,
+    /// Bodies and their slots.
+    pub bodies: &'a Bodies,
+    /// What contacts know of bodies.
+    pub surfaces: Surfaces<'a>,
+    /// Pairs farther apart neither touch nor meet in half a step.
+    pub reach: Reach,
+    /// Length of the step (s).
+    pub dt: f32,
+}
+
 /// Overlap (as a fraction of the contact diameter) from which on a pair is looked at that could pass through (E12).
 pub(crate) const DEEP: f32 = 0.5;
 /// It is stopped if its kinetic energy is so many times what the springs may still take.
 pub(crate) const HELD: f32 = 1.05;
 
-/// Pairs of one particle looked at together.
-const NEAR: usize = 32;
-
-/// Contacts of the particles from `input.first` on that may touch any, and the slips of those that rub; [`Touch::slips`] tells whose.
+/// Contacts of a chunk of slots from `first` on.
 #[inline(always)]
-pub fn chunk<S: Simd>(_simd: S, input: &Input, touch: &mut [Touch], slips: &mut Vec<Slips>) {
+pub fn chunk<S: Simd>(simd: S, input: &Input, first: usize, scratch: &mut Sifted, rows: &mut Rows, runs: &mut Runs) {
+    let count = sift(input, first, rows, scratch);
+    if count == 0 && !runs.felt {
+        return;
+    }
+    meet(input, runs);
+    runs.felt = count > 0;
     match (input.model.solver.surface == Surface::Smooth, input.model.solver.damping == Damping::Full) {
-        (true, false) => particles::<true, false>(input, touch, slips),
-        (false, false) => particles::<false, false>(input, touch, slips),
-        (true, true) => particles::<true, true>(input, touch, slips),
-        (false, true) => particles::<false, true>(input, touch, slips),
+        (true, false) => particles::<S, true, false>(simd, input, scratch, count, rows, runs),
+        (false, false) => particles::<S, false, false>(simd, input, scratch, count, rows, runs),
+        (true, true) => particles::<S, true, true>(simd, input, scratch, count, rows, runs),
+        (false, true) => particles::<S, false, true>(simd, input, scratch, count, rows, runs),
+    }
+    for (run, sum) in runs.run.iter().zip(&runs.sum) {
+        if sum.felt[8] > 0.0 {
+            input.surfaces.stir(run.body[0], run.body[1]);
+        }
     }
 }
 
+/// Numbers of the two bodies of a pair, as they stand in the second half of its row; before them the rest of a normal.
+const SPIN: [usize; 2] = [LANES + 2, LANES + 5];
+const MASS: usize = LANES + 8;
+const LN_RESTITUTION: usize = LANES + 9;
+const SHARED_BY: usize = LANES + 10;
+const FACE: usize = LANES + 11;
+const RUBS: usize = LANES + 12;
+const STIFFNESS: usize = LANES + 13;
+const DAMPING: usize = LANES + 14;
+const COUNTED: usize = LANES + 15;
+/// The pair's own numbers.
+const D: usize = 0;
+const V: usize = 3;
+const SLIP: usize = 6;
+const ARM: usize = 9;
+const FACING: [usize; 2] = [12, 15];
+
+/// Lays out what laws ask of each two bodies.
 #[inline(always)]
-fn particles<const SMOOTH: bool, const FULL: bool>(input: &Input, touch: &mut [Touch], slips: &mut Vec<Slips>) {
-    let (model, surfaces) = (input.model, &input.surfaces);
-    slips.clear();
-    let [balls, faces] = [surfaces.reach.balls, surfaces.reach.faces].map(|reach| (reach * reach) as f32);
-    let mut batch = Batch::default();
-    let mut friction = Friction::default();
-    for k in 0..touch.len() {
-        let slot = surfaces.slot[input.first + k] as usize;
-        if !surfaces.kept.busy(slot) {
+fn meet(input: &Input, runs: &mut Runs) {
+    let (solid, periodic) = (input.surfaces.solid, input.model.grid.period != [0.0; 3]);
+    for ((run, law), sum) in runs.run.iter().zip(&mut runs.law).zip(&mut runs.sum) {
+        let [a, b] = run.body.map(|body| &solid[body as usize]);
+        let law = &mut law.0;
+        law[2..5].copy_from_slice(&a.spin.to_array());
+        law[5..8].copy_from_slice(&b.spin.to_array());
+        law[8] = 1.0 / (a.inverse_mass + b.inverse_mass);
+        law[9] = Model::ln_restitution(a.inverse_mass, a.ln_restitution, b.inverse_mass, b.ln_restitution);
+        law[10] = a.shared_by.max(b.shared_by);
+        law[11] = a.face.max(b.face);
+        law[12] = Model::friction_of(a.friction, b.friction);
+        law[13] = a.stiffness.max(b.stiffness);
+        law[14] = a.damping.max(b.damping);
+        law[15] = a.sharers.max(b.sharers);
+        sum.felt = [0.0; 9];
+        sum.apart = if periodic { apart(input.model, input.bodies, run.slot) } else { b.x - a.x };
+    }
+}
+
+/// Pairs of a chunk that are near: scratch of a thread.
+#[derive(Default)]
+pub struct Sifted {
+    own: Vec<Own>,
+    pair: Vec<Pair>,
+}
+
+/// A pair that is near.
+#[derive(Clone, Copy, Default)]
+struct Pair {
+    /// Where it stands in the rows.
+    at: u32,
+    /// Which of those that have rows looks.
+    own: u32,
+    /// Slot of the other.
+    other: u32,
+    /// From the one to the other (m).
+    d: Vec3,
+    /// Normal of the other.
+    facing: [f32; 3],
+}
+
+/// Finds the pairs of a chunk that are near, and says how many: a loop of its own, as it waits for memory.
+#[inline(always)]
+fn sift(input: &Input, first: usize, rows: &Rows, to: &mut Sifted) -> usize {
+    let (model, b) = (input.model, input.bodies);
+    let periodic = model.grid.period != [0.0; 3];
+    let [balls, faces] = [input.reach.balls, input.reach.faces].map(|reach| (reach * reach) as f32);
+    let (mut body, mut axes, mut asleep) = (u32::MAX, DMat3::IDENTITY, false);
+    if to.pair.len() <= rows.with.len() {
+        to.pair.resize(rows.with.len() + 1, Pair::default());
+    }
+    to.own.clear();
+    let mut count = 0;
+    for k in 0..rows.begin.len() - 1 {
+        let (row, slot) = (rows.row(k), first + k);
+        if row.is_empty() {
             continue;
         }
-        touch[k] = Touch::default();
-        // what sleeps feels nothing new
-        if surfaces.asleep(surfaces.owner[slot]) {
-            continue;
+        if b.owner[slot] != body {
+            body = b.owner[slot];
+            axes = DMat3::from_quat(b.body[body as usize].q);
+            asleep = input.surfaces.asleep(body);
         }
-        let own = Vec3::from(surfaces.record[slot].x);
-        for listed in surfaces.kept.of(slot).chunks(NEAR) {
+        let own = &b.record[slot];
+        let x = Vec3::from(own.x);
+        for at in row {
+            let with = rows.with[at];
+            let other = (with & SLOT) as usize;
+            let mut d = Vec3::from(b.record[other].x) - x;
+            if periodic {
+                d = wrap(model, d);
+            }
             // which are near is not to be foretold: all are noted, and those that are not are written over
-            let (mut near, mut count) = ([(0, Vec3::ZERO); NEAR], 0);
-            for &listed in listed {
-                let other = (listed & !FACED) as usize;
-                let d = wrap(model, Vec3::from(surfaces.record[other].x) - own);
-                near[count % NEAR] = (other, d);
-                let limit = if listed & FACED != 0 { faces } else { balls };
-                count += usize::from(d.length_squared() < limit);
-            }
-            for &(other, d) in &near[..count.min(NEAR)] {
-                batch.add(surfaces, k, [slot, other], d);
-                if batch.len == LANES {
-                    let found = law::<SMOOTH, FULL>(input, &batch);
-                    give::<FULL>(input, &batch, &found, touch, &mut friction, slips);
-                    batch.len = 0;
-                }
-            }
+            let facing = b.facing[other];
+            to.pair[count] = Pair { at: at as u32, own: to.own.len() as u32, other: other as u32, d, facing };
+            let limit = if with & FACED != 0 { faces } else { balls };
+            // what sleeps feels nothing new of what sleeps
+            let idle = asleep && input.surfaces.asleep(b.owner[other]);
+            count += usize::from(((d.length_squared() < limit) | (with & LIVE != 0)) & !idle);
+        }
+        let arm = (axes * b.offset[slot]).as_vec3();
+        to.own.push(Own { v: own.v.into(), facing: b.facing[slot], arm });
+    }
+    count
+}
+
+#[inline(always)]
+fn particles<S: Simd, const SMOOTH: bool, const FULL: bool>(
+    simd: S,
+    input: &Input,
+    sifted: &Sifted,
+    count: usize,
+    rows: &mut Rows,
+    runs: &mut Runs,
+) {
+    let mut batch = Batch::default();
+    for pair in &sifted.pair[..count] {
+        batch.add(input.bodies, rows, runs, &sifted.own[pair.own as usize], pair);
+        if batch.len == LANES {
+            batch.end::<S, SMOOTH, FULL>(simd, input, rows, runs);
         }
     }
     if batch.len > 0 {
-        let found = law::<SMOOTH, FULL>(input, &batch);
-        give::<FULL>(input, &batch, &found, touch, &mut friction, slips);
+        batch.end::<S, SMOOTH, FULL>(simd, input, rows, runs);
     }
-    friction.end(input, touch, slips);
+}
+
+/// A particle that looks at others.
+#[derive(Clone, Copy, Default)]
+struct Own {
+    v: Vec3,
+    facing: [f32; 3],
+    /// From its body's centre of mass (m).
+    arm: Vec3,
 }
 
 /// Sixteen pairs, and what laws ask of them.
 #[derive(Default)]
 struct Batch {
     len: usize,
-    /// Particle of the chunk.
-    k: [usize; LANES],
-    slot: [[usize; 2]; LANES],
-    d: [Lanes; 3],
-    v: [Lanes; 3],
-    facing: [[Lanes; 3]; 2],
-    spin: [[Lanes; 3]; 2],
-    inverse_mass: [Lanes; 2],
-    friction: [Lanes; 2],
-    ln_restitution: Lanes,
-    shared_by: Lanes,
-    face: Lanes,
-    stiffness: Lanes,
-    damping: Lanes,
-    counted: Lanes,
-    slip: [Lanes; 3],
+    /// Where each stands in the rows, and its run.
+    at: [usize; LANES],
+    run: [usize; LANES],
+    /// Pair by pair; transposed before the laws are applied.
+    numbers: [[Indices; LANES]; 2],
 }
 
 impl Batch {
     #[inline(always)]
-    fn add(&mut self, surfaces: &Surfaces, k: usize, slot: [usize; 2], d: Vec3) {
-        let l = self.len % LANES;
-        let body = slot.map(|slot| surfaces.owner[slot]);
-        let [a, b] = body.map(|body| &surfaces.solid[body as usize]);
-        let [own, other] = slot.map(|slot| surfaces.record[slot].v);
-        let facing = slot.map(|slot| surfaces.facing[slot]);
-        let slip = if surfaces.slips.is_empty() { [0.0; 3] } else { surfaces.slip(Pair { slot, body }) };
-        (self.k[l], self.slot[l]) = (k, slot);
-        for c in 0..3 {
-            self.d[c][l] = d[c];
-            self.v[c][l] = other[c] - own[c];
-            self.slip[c][l] = slip[c];
-            self.facing[0][c][l] = facing[0][c];
-            self.facing[1][c][l] = facing[1][c];
-            self.spin[0][c][l] = a.spin[c];
-            self.spin[1][c][l] = b.spin[c];
-        }
-        self.inverse_mass[0][l] = a.inverse_mass;
-        self.inverse_mass[1][l] = b.inverse_mass;
-        self.friction[0][l] = a.friction;
-        self.friction[1][l] = b.friction;
-        self.ln_restitution[l] =
-            Model::ln_restitution(a.inverse_mass, a.ln_restitution, b.inverse_mass, b.ln_restitution);
-        self.shared_by[l] = a.shared_by.max(b.shared_by);
-        self.face[l] = a.face.max(b.face);
-        self.stiffness[l] = a.stiffness.max(b.stiffness);
-        self.damping[l] = a.damping.max(b.damping);
-        self.counted[l] = a.sharers.max(b.sharers);
+    fn add(&mut self, bodies: &Bodies, rows: &Rows, runs: &Runs, own: &Own, pair: &Pair) {
+        let (l, at) = (self.len % LANES, pair.at as usize);
+        let run = runs.of[at] as usize;
+        (self.at[l], self.run[l]) = (at, run);
+        let v = Vec3::from(bodies.record[pair.other as usize].v) - own.v;
+        let [x, y, z] = pair.facing;
+        let first: &mut Lanes = bytemuck::cast_mut(&mut self.numbers[0][l].0);
+        first[D..D + 3].copy_from_slice(&pair.d.to_array());
+        first[V..V + 3].copy_from_slice(&v.to_array());
+        first[SLIP..SLIP + 3].copy_from_slice(&rows.slip[at]);
+        first[ARM..ARM + 3].copy_from_slice(&own.arm.to_array());
+        first[FACING[0]..FACING[0] + 3].copy_from_slice(&own.facing);
+        first[FACING[1]] = x;
+        let second: &mut Lanes = bytemuck::cast_mut(&mut self.numbers[1][l].0);
+        *second = runs.law[run].0;
+        (second[0], second[1]) = (y, z);
         self.len += 1;
+    }
+
+    /// Works out the laws, and adds what was found.
+    #[inline(always)]
+    fn end<S: Simd, const SMOOTH: bool, const FULL: bool>(
+        &mut self,
+        simd: S,
+        input: &Input,
+        rows: &mut Rows,
+        runs: &mut Runs,
+    ) {
+        transpose(simd, &mut self.numbers[0]);
+        transpose(simd, &mut self.numbers[1]);
+        let numbers: &[[Lanes; LANES]; 2] = bytemuck::cast_ref(&self.numbers);
+        let mut found = law::<SMOOTH, FULL>(input, numbers.as_flattened());
+        transpose(simd, &mut found);
+        for l in 0..self.len.min(LANES) {
+            let found: &Lanes = bytemuck::cast_ref(&found[l].0);
+            let (at, sum) = (self.at[l], &mut runs.sum[self.run[l]].felt);
+            for c in 0..9 {
+                sum[c] += f64::from(found[c]);
+            }
+            rows.force[at] = [found[0], found[1], found[2]];
+            rows.slip[at] = [found[9], found[10], found[11]];
+            let live = if found[12] > 0.0 { LIVE } else { 0 };
+            rows.with[at] = rows.with[at] & !LIVE | live;
+        }
+        self.len = 0;
     }
 }
 
-/// What laws make of sixteen pairs.
-struct Found {
-    /// Force on the first of each pair (N), and its couple (N m).
-    force: [Lanes; 3],
-    couple: [Lanes; 3],
-    /// The pair's part in a contact of faces.
-    part: Lanes,
-    /// 1 where they touch, and where they would pass through each other.
-    touching: Lanes,
-    deep: Lanes,
-    /// Slip that friction holds (m) and the load that it bears (N), 0 where nothing is to be remembered.
-    slip: [Lanes; 3],
-    load: Lanes,
-    springs: Lanes,
-}
+/// What laws make of sixteen pairs, number by number: force on the first of each pair (N), its part in the contact of faces where they
+/// touch, torque about the centre of mass of the first's body (N m), 1 where they would pass through each other, 1 where they touch, slip that
+/// friction holds (m), part.
+type Found = [Indices; LANES];
 
 #[inline(always)]
-fn three(of: &[Lanes; 3], l: usize) -> Vec3 {
-    Vec3::new(of[0][l], of[1][l], of[2][l])
+fn three(of: &[Lanes], c: usize, l: usize) -> Vec3 {
+    Vec3::new(of[c][l], of[c + 1][l], of[c + 2][l])
 }
 
 /// E10-E13 in lanes: one loop with everything in it, without branches.
 #[inline(always)]
-fn law<const SMOOTH: bool, const FULL: bool>(input: &Input, batch: &Batch) -> Found {
+fn law<const SMOOTH: bool, const FULL: bool>(input: &Input, of: &[Lanes]) -> Found {
     let (model, dt) = (input.model, input.dt);
     let diameter = model.contact_diameter as f32;
     let spacing = model.spacing as f32;
     let rate = model.contact_rate();
-    let zero = [0.0; LANES];
-    let mut out = Found {
-        force: [zero; 3],
-        couple: [zero; 3],
-        part: zero,
-        touching: zero,
-        deep: zero,
-        slip: [zero; 3],
-        load: zero,
-        springs: zero,
-    };
+    let mut found = [Block::default(); LANES];
+    assert!(of.len() == 2 * LANES);
     for l in 0..LANES {
-        let d = three(&batch.d, l);
+        let d = three(of, D, l);
         let r = d.length();
         let (mut n, mut along, mut s, mut part) = (d * (1.0 / r.max(1e-12)), d, r, 1.0);
         // where they touch, seen from i: midway, or where a ball stands on a face
         let mut arm = 0.5 * d;
         if SMOOTH {
-            let (a, b) = (three(&batch.facing[0], l), three(&batch.facing[1], l));
+            let (a, b) = (three(of, FACING[0], l), three(of, FACING[1], l));
             let normal = contact::contact_normal(d.to_array(), r, a.to_array(), b.to_array());
             let normal = Vec3::new(normal.x, normal.y, normal.z);
             let (a, b) = (a.length_squared() > 0.0, b.length_squared() > 0.0);
@@ -306,23 +371,17 @@ fn law<const SMOOTH: bool, const FULL: bool>(input: &Input, batch: &Batch) -> Fo
             arm = if faced & b & !a { 0.5 * along } else { arm };
         }
         let near = (s < 1.5 * diameter) & (part > 0.0);
-        let mut v = three(&batch.v, l);
-        let (spin_a, spin_b) = (three(&batch.spin[0], l), three(&batch.spin[1], l));
+        let mut v = three(of, V, l);
+        let (spin_a, spin_b) = (three(of, SPIN[0], l), three(of, SPIN[1], l));
         if !FULL {
             // velocities where the bodies touch
             v -= spin_a.cross(arm) + spin_b.cross(d - arm);
         }
-        let counted = batch.counted[l];
-        let (i_a, i_b) = (batch.inverse_mass[0][l], batch.inverse_mass[1][l]);
-        let mass = 1.0 / (i_a + i_b);
-        let share = [batch.shared_by[l], counted];
-        let (k, eta) = Model::contact_constants(
-            mass,
-            batch.ln_restitution[l],
-            share,
-            rate,
-            [batch.stiffness[l], batch.damping[l]],
-        );
+        let counted = of[COUNTED][l];
+        let mass = of[MASS][l];
+        let share = [of[SHARED_BY][l], counted];
+        let stated = [of[STIFFNESS][l], of[DAMPING][l]];
+        let (k, eta) = Model::contact_constants(mass, of[LN_RESTITUTION][l], share, rate, stated);
         let only = if FULL { 0.0 } else { 1.0 };
         let f = contact::contact_force(along.to_array(), v.to_array(), s, diameter, k, eta, only, dt);
         let mut f = Vec3::new(f.x, f.y, f.z) * part;
@@ -330,11 +389,12 @@ fn law<const SMOOTH: bool, const FULL: bool>(input: &Input, batch: &Batch) -> Fo
         let overlap = diameter - s;
         let held = counted.max(1.0) * k * (diameter * diameter - overlap * overlap);
         let deep = near & (overlap > DEEP * diameter) & (speed < 0.0) & (mass * speed * speed > HELD * held);
-        let stop = if dt > 0.0 { mass / (dt * batch.face[l]) } else { 0.0 };
+        let stop = if dt > 0.0 { mass / (dt * of[FACE][l]) } else { 0.0 };
         f += n * if deep { speed * part * stop } else { 0.0 };
         let touching = near & (s < diameter);
+        let mut couple = Vec3::ZERO;
         if !FULL {
-            let mu = Model::friction_of(batch.friction[0][l], batch.friction[1][l]);
+            let mu = of[RUBS][l];
             let rubs = touching & (mu > 0.0);
             let load = (-f.dot(n)).max(0.0);
             let v = v - n * speed;
@@ -342,7 +402,7 @@ fn law<const SMOOTH: bool, const FULL: bool>(input: &Input, batch: &Batch) -> Fo
             let shared = share[0].max(share[1]);
             let eta_t = part * contact::dashpot(TANGENTIAL_DAMPING, k_t / part * shared, mass) / shared;
             let turn = 0.5 * dt * (spin_a + spin_b).dot(n);
-            let slip = contact::slip_carried(three(&batch.slip, l).to_array(), n.to_array(), turn);
+            let slip = contact::slip_carried(three(of, SLIP, l).to_array(), n.to_array(), turn);
             let slip = Vec3::new(slip.x, slip.y, slip.z) + v * dt;
             let limit = mu * load;
             let spring = contact::friction((k_t * slip).to_array(), limit);
@@ -350,130 +410,21 @@ fn law<const SMOOTH: bool, const FULL: bool>(input: &Input, batch: &Batch) -> Fo
             let total = contact::friction((spring + eta_t * v).to_array(), limit);
             f = if rubs { f + Vec3::new(total.x, total.y, total.z) } else { f };
             let slip = spring / k_t;
-            (out.slip[0][l], out.slip[1][l], out.slip[2][l]) = (slip.x, slip.y, slip.z);
-            out.load[l] = load;
-            out.springs[l] = if rubs { k_t } else { 0.0 };
-            let couple = arm.cross(f);
-            (out.couple[0][l], out.couple[1][l], out.couple[2][l]) = (couple.x, couple.y, couple.z);
+            for c in 0..3 {
+                found[9 + c].0[l] = if rubs & (k_t > 0.0) { slip[c] } else { 0.0 };
+            }
+            couple = arm.cross(f);
         }
-        (out.force[0][l], out.force[1][l], out.force[2][l]) = (f.x, f.y, f.z);
-        out.part[l] = if near { part } else { 0.0 };
-        out.touching[l] = if touching { 1.0 } else { 0.0 };
-        out.deep[l] = if deep { 1.0 } else { 0.0 };
-    }
-    out
-}
-
-/// Adds what was found to the particles.
-#[inline(always)]
-fn give<const FULL: bool>(
-    input: &Input,
-    batch: &Batch,
-    found: &Found,
-    touch: &mut [Touch],
-    friction: &mut Friction,
-    slips: &mut Vec<Slips>,
-) {
-    let surfaces = &input.surfaces;
-    for l in 0..batch.len.min(LANES) {
-        if found.part[l] <= 0.0 {
-            continue;
-        }
-        if batch.k[l] != friction.k {
-            friction.end(input, touch, slips);
-            friction.k = batch.k[l];
-        }
-        let touch = &mut touch[batch.k[l]];
+        f = if near { f } else { Vec3::ZERO };
+        let torque = three(of, ARM, l).cross(f) + if near { couple } else { Vec3::ZERO };
         for c in 0..3 {
-            touch.contact[c] += found.force[c][l];
-            if !FULL {
-                touch.couple[c] += found.couple[c][l];
-            }
+            found[c].0[l] = f[c];
+            found[4 + c].0[l] = torque[c];
         }
-        if found.touching[l] > 0.0 {
-            let slot = batch.slot[l];
-            let pair = Pair { slot, body: slot.map(|slot| surfaces.owner[slot]) };
-            touch.contacts += 1;
-            touch.sharers += found.part[l];
-            touch.deep += found.deep[l] as u32;
-            surfaces.stir(pair.body[0], pair.body[1]);
-            if !FULL && found.springs[l] > 0.0 && surfaces.keeps(pair) {
-                friction.keep(slot[1] as u32, three(&found.slip, l).to_array(), found.load[l]);
-            }
-        }
+        found[3].0[l] = if touching { part } else { 0.0 };
+        found[7].0[l] = if touching & deep { 1.0 } else { 0.0 };
+        found[8].0[l] = if touching { 1.0 } else { 0.0 };
+        found[12].0[l] = if near { 1.0 } else { 0.0 };
     }
-}
-
-/// What friction of one particle remembers of its contacts (E13; Cundall and Strack 1979; Luding 2008).
-#[derive(Default)]
-struct Friction {
-    /// Particle of the chunk.
-    k: usize,
-    slips: Slips,
-    load: [f32; HELD_CONTACTS],
-    /// Contacts for whose slip there was no place.
-    forgotten: u32,
-}
-
-/// Who touches whom: slots and bodies of this particle and of the other.
-#[derive(Clone, Copy)]
-struct Pair {
-    slot: [usize; 2],
-    body: [u32; 2],
-}
-
-impl Friction {
-    /// Notes what the particle goes on remembering, and makes room for the next.
-    #[inline(always)]
-    fn end(&mut self, input: &Input, touch: &mut [Touch], slips: &mut Vec<Slips>) {
-        if self.slips.is_empty() {
-            return;
-        }
-        let owner = input.surfaces.owner[input.surfaces.slot[input.first + self.k] as usize];
-        let touch = &mut touch[self.k];
-        touch.forgotten = self.forgotten;
-        if input.model.moves(owner) {
-            slips.push(self.slips);
-            touch.slips = slips.len() as u32;
-        }
-        *self = Self::default();
-    }
-
-    /// Remembers the slip of a contact; where there are too many, the one that bears least is forgotten.
-    #[inline(always)]
-    fn keep(&mut self, with: u32, slip: [f32; 3], load: f32) {
-        let mut weakest = 0;
-        for k in 0..HELD_CONTACTS {
-            if self.slips.with[k] == Slips::NONE {
-                (self.slips.with[k], self.slips.slip[k], self.load[k]) = (with, slip, load);
-                return;
-            }
-            if self.load[k] < self.load[weakest] {
-                weakest = k;
-            }
-        }
-        self.forgotten += 1;
-        if load > self.load[weakest] {
-            (self.slips.with[weakest], self.slips.slip[weakest], self.load[weakest]) = (with, slip, load);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Of more contacts than a particle remembers those that bear most stay, and the others are counted.
-    #[test]
-    fn forgotten_slips_are_counted() {
-        let mut friction = Friction::default();
-        let loads = [3.0, 1.0, 5.0, 2.0, 9.0, 7.0, 4.0, 6.0, 8.0, 0.5];
-        for (with, load) in (0..).zip(loads) {
-            friction.keep(with, [load, 0.0, 0.0], load);
-        }
-        let slips = friction.slips;
-        assert_eq!(friction.forgotten as usize, loads.len() - HELD_CONTACTS);
-        // the ninth took the place of the one that bore least, the tenth bears less than any
-        assert_eq!((slips.of(8), slips.of(1), slips.of(9)), (Some([8.0, 0.0, 0.0]), None, None));
-    }
+    bytemuck::cast(found)
 }

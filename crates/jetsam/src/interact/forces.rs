@@ -4,7 +4,7 @@
 //! (N) for the particles of bodies; `touch`, of what that force consists; `carry` for XSPH, shifting and the rate of density. Sums over SPH pairs are in [`super::pairs`], contacts of
 //! bodies in [`super::contacts`].
 
-use super::contacts::{self, Surfaces};
+use super::contacts::Surfaces;
 use super::gradients::confinement;
 use super::lanes::{LANES, listed};
 use super::neighbours::{NeighbourChunk, Runs};
@@ -13,7 +13,7 @@ use super::slices::{Own, Slices};
 use crate::laws::{contact, field};
 use crate::model::{CONTACT_REACH, Model};
 use crate::scene::{Coupling, Damping, Force};
-use crate::state::{Kind, Record, Slips, Touch};
+use crate::state::{Kind, Record, Touch};
 use fearless_simd::Simd;
 use glam::{DVec3, Vec3};
 
@@ -34,7 +34,7 @@ pub struct Input<'a> {
     pub first: usize,
     /// Mass of the particles of each body (kg), for fields.
     pub particle_mass: &'a [f32],
-    /// What contacts know of bodies.
+    /// Bodies as those see them that touch them.
     pub surfaces: Surfaces<'a>,
     /// Gravity now (m/s^2), shaking of the scene included.
     pub gravity: Vec3,
@@ -60,8 +60,6 @@ pub struct OnBodies<'a> {
     pub push: &'a mut [[f32; 3]],
     /// Of what the forces consist.
     pub touch: &'a mut [Touch],
-    /// Slips of the contacts of those that rub, in their order; [`Touch::slips`] tells whose.
-    pub slips: &'a mut Vec<Slips>,
 }
 
 /// Forces on a chunk of fluid particles.
@@ -75,26 +73,14 @@ pub fn fluids<S: Simd>(simd: S, input: Input, slices: &Slices, out: OnFluids) {
     }
 }
 
-/// Forces on a chunk of particles of bodies.
+/// Forces on a chunk of particles of bodies, contacts aside.
 #[inline(always)]
 pub fn bodies<S: Simd>(simd: S, input: Input, kind: Kind, chunk: &NeighbourChunk, out: OnBodies) {
     out.touch.fill(Touch::default());
-    contacts::chunk(simd, &input, out.touch, out.slips);
     if input.model.plain() && input.mirror.is_empty() {
         on_bodies::<S, true>(simd, input, kind, chunk, out);
     } else {
         on_bodies::<S, false>(simd, input, kind, chunk, out);
-    }
-}
-
-/// The same where nothing but contacts acts: written for those alone that may touch.
-#[inline(always)]
-pub fn touches<S: Simd>(simd: S, input: Input, out: OnBodies) {
-    contacts::chunk(simd, &input, out.touch, out.slips);
-    for (k, (push, touch)) in out.push.iter_mut().zip(out.touch).enumerate() {
-        if input.surfaces.kept.busy(input.surfaces.slot[input.first + k] as usize) {
-            *push = touch.contact;
-        }
     }
 }
 
@@ -204,7 +190,7 @@ fn springs_on(input: &Input, slices: &Slices, k: usize, own: &Record, owner: u32
     contacts
 }
 
-/// Force on a particle of a body; that of fluids is noted beside its contacts.
+/// Force on a particle of a body; that of fluids is noted.
 #[inline(always)]
 fn on_body<S: Simd, const PLAIN: bool>(
     simd: S,
@@ -240,7 +226,6 @@ fn on_body<S: Simd, const PLAIN: bool>(
         springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
     });
     touch.fluid = force.to_array();
-    force += Vec3::from(touch.contact);
     if model.moves(owner) {
         force += fields(model, own) * input.particle_mass[owner as usize];
     }

@@ -85,9 +85,20 @@ pub struct Candidates<'a> {
     pub owner: &'a [Indices],
 }
 
-/// Appends to `list` the indices of the candidates closer to `x` than the root of `limit`, in their order, and to
+/// Whose points are searched.
+#[derive(Clone, Copy)]
+pub enum Whose {
+    /// All.
+    Anybody,
+    /// Those of any but this owner.
+    Others(u32),
+    /// Those of owners after this one.
+    Later(u32),
+}
+
+/// Appends to `list` the indices of the candidates of `whose` owners closer to `x` than the root of `limit`, in their order, and to
 /// `r_sq` their squared distances; fills up whole vectors with `pad` at the distance of the limit. Returns how many
-/// are near. Points of the owner `not` are passed over. Both lists need room for all candidates and a vector more.
+/// are near. Both lists need room for all candidates and a vector more.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub fn near<S: Simd>(
@@ -95,7 +106,7 @@ pub fn near<S: Simd>(
     candidates: &Candidates,
     x: [f32; 3],
     limit: f32,
-    not: Option<u32>,
+    whose: Whose,
     pad: u32,
     list: &mut [u32],
     r_sq: &mut [f32],
@@ -113,8 +124,10 @@ pub fn near<S: Simd>(
         let d_z = f32x16::load_array_ref(simd, &tile_z.0) - z;
         let r = d_x * d_x + d_y * d_y + d_z * d_z;
         let mut near = r.simd_lt(limit);
-        if let Some(own) = not {
-            near &= !u32x16::load_array_ref(simd, &owner.0).simd_eq(u32x16::splat(simd, own));
+        match whose {
+            Whose::Anybody => {}
+            Whose::Others(own) => near &= !u32x16::load_array_ref(simd, &owner.0).simd_eq(u32x16::splat(simd, own)),
+            Whose::Later(own) => near &= u32x16::load_array_ref(simd, &owner.0).simd_gt(u32x16::splat(simd, own)),
         }
         let index = u32x16::load_array_ref(simd, &index.0);
         // SAFETY: after k vectors n <= 16 k, and there is room for all of them and one more

@@ -7,7 +7,7 @@
 //! tested sixteen at a time.
 
 use super::cells::{Cells, Grid};
-use super::lanes::{Block, Candidates, Indices, LANES, near, pack, padded};
+use super::lanes::{Block, Candidates, Indices, LANES, Whose, near, pack, padded};
 use crate::state::{Kind, Record};
 use fearless_simd::Simd;
 use std::cell::RefCell;
@@ -95,6 +95,8 @@ pub struct Scratch {
     pub rows: NeighbourChunk,
     /// Numbers around a chunk, see [`super::links::Links`].
     pub places: super::links::Table,
+    /// Contacts of a chunk that are near.
+    pub sifted: super::contacts::Sifted,
 }
 
 thread_local! {
@@ -128,6 +130,8 @@ pub struct Around<'a> {
     pub asleep: &'a [bool],
     /// Whether bodies' particles look for each other; else for fluids.
     pub contacts: bool,
+    /// Whether pairs of rigid bodies are found once, from the particle of the first.
+    pub once: bool,
     /// How far pairs reach (m): the support, or as far as contacts are looked for.
     pub reach: f32,
 }
@@ -209,11 +213,15 @@ impl NeighbourChunk {
                     if tile.len == 0 {
                         continue;
                     }
-                    let not = if (kind, k) == (Kind::Rigid, Kind::Rigid) { Some(around.owner[i]) } else { None };
+                    let whose = match (kind, k) {
+                        (Kind::Rigid, Kind::Rigid) if around.once => Whose::Later(around.owner[i]),
+                        (Kind::Rigid, Kind::Rigid) => Whose::Others(around.owner[i]),
+                        _ => Whose::Anybody,
+                    };
                     let limit = around.reach * around.reach;
                     let list = &mut self.list[used..];
                     let r_sq = &mut bytemuck::cast_slice_mut(&mut scratch.r_sq)[used - base..];
-                    let n = near(simd, &tile.candidates(), around.records[i].x, limit, not, i as u32, list, r_sq);
+                    let n = near(simd, &tile.candidates(), around.records[i].x, limit, whose, i as u32, list, r_sq);
                     runs.count[k as usize] = n as u16;
                     used += padded(n);
                 }

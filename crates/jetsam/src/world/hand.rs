@@ -9,7 +9,7 @@ use crate::integrate::bodies;
 use crate::integrate::sources::Source;
 use crate::model::Model;
 use crate::scene::FlockModel;
-use crate::state::{Bodies, Body, HELD_CONTACTS, Kind, Particles, Slips, State};
+use crate::state::{Bodies, Body, Contacts, Kind, Particles, State};
 use glam::{DMat3, DVec3, Vec3};
 
 /// A body held at a point.
@@ -236,9 +236,6 @@ fn carry_over(old: &State, new: &mut State, twins: &[Option<usize>], model: &Mod
 
 /// Slips of the contacts between bodies that are in both, under their new slots.
 fn carry_slips(old: &Bodies, new: &mut Bodies, twins: &[Option<usize>]) {
-    if old.slips.is_empty() || new.slips.is_empty() {
-        return;
-    }
     let mut heir = vec![None; old.body.len()];
     twins.iter().enumerate().for_each(|(index, twin)| twin.iter().for_each(|&k| heir[k] = Some(index)));
     let moved = |slot: u32| {
@@ -246,15 +243,8 @@ fn carry_slips(old: &Bodies, new: &mut Bodies, twins: &[Option<usize>]) {
         let index: usize = heir[body]?;
         Some((new.body[index].slots.start + slot as usize - old.body[body].slots.start) as u32)
     };
-    for (slot, held) in old.slips.iter().enumerate() {
-        let Some(to) = moved(slot as u32) else { continue };
-        let still = (0..HELD_CONTACTS).filter(|&k| held.with[k] != Slips::NONE);
-        let still = still.filter_map(|k| Some((moved(held.with[k])?, held.slip[k])));
-        for (k, (with, slip)) in still.enumerate() {
-            let slips = &mut new.slips[to as usize];
-            (slips.with[k], slips.slip[k]) = (with, slip);
-        }
-    }
+    let still = old.contacts.slipped().filter_map(|([a, b], slip)| Some(([moved(a)?, moved(b)?], slip)));
+    new.contacts = Contacts::new(new.rigid_slots, still);
 }
 
 /// Particles of the bodies that are new.

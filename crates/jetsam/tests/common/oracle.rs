@@ -202,13 +202,15 @@ fn compare(text: &str, disturb: impl Fn(&mut Assembly), period: DVec3, run: Run)
     let largest = expected.force.iter().map(|f| f.length()).fold(1e-30, f64::max);
     let fastest_rate = expected.rate.iter().map(|r| r.abs()).fold(1e-30, f64::max);
     let mut checked = 0;
+    let mut on_bodies = world.state().forces_on_bodies();
     for kind in Kind::ALL {
         let first = p.first[kind as usize];
         for i in got.segment(kind) {
             // ids of fluids and slots of bodies are places in the assembly's order
             let slot = got.id[i] as usize - if kind == Kind::Static { assembly.state.bodies.rigid_slots } else { 0 };
             let k = first + slot;
-            let push = DVec3::from(got.push[i].map(f64::from));
+            let push = if kind == Kind::Fluid { got.push[i] } else { on_bodies.next().unwrap() };
+            let push = DVec3::from(push.map(f64::from));
             let force = if kind == Kind::Fluid { mass * (push - gravity) } else { push };
             let error = (force - expected.force[k]).length() / largest;
             assert!(error < 3e-5, "{kind:?} {k}: force {force} {}, off by {error}", expected.force[k]);

@@ -5,12 +5,12 @@
 
 use super::{Cpu, GONE};
 use crate::integrate::{Advance, bodies, joints};
-use crate::interact::contacts::{Solid, Surfaces};
+use crate::interact::contacts::{self, Solid, Surfaces};
 use crate::interact::kept::{Kept, Reach};
 use crate::interact::neighbours::{NeighbourChunk, with_scratch};
 use crate::interact::{CHUNK, density, forces};
 use crate::model::{CONTACT_SKIN, Model};
-use crate::state::{Bodies, Kind, Slips, State, Touch};
+use crate::state::{Kind, State, Touch};
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering::Relaxed;
@@ -21,19 +21,21 @@ pub(super) struct Contacts {
     kept: Kept,
     /// Whether the lists hold for the bodies as they stand.
     hold: bool,
-    /// How much farther than contacts the lists reach, in contact diameters.
+    /// How much farther than contacts the lists reach at most, in contact diameters.
     pub skin: f64,
-    found: [Vec<NeighbourChunk>; 2],
+    /// How much farther new ones are to reach (m).
+    farther: f64,
+    found: Vec<NeighbourChunk>,
     /// What contacts know of each body, and how near those are that matter now (m).
     pub solid: Vec<Solid>,
     pub reach: Reach,
-    /// Whether each rigid slot remembers slips.
-    pub held: Vec<bool>,
-    /// Slips found by forces, chunk by chunk, of rigid and of static particles (none).
-    slips: [Vec<Vec<Slips>>; 2],
-    /// Chunks of rigid and static particles in which all that can touch nothing have no force, and of how many particles.
+    /// Chunks of rigid and static particles in which nothing but contacts is felt, and of how many particles.
     clean: [(usize, Vec<bool>); 2],
 }
+
+/// Lists are to last so many steps, and reach as much farther for it; so many contact diameters at least.
+const LASTING: f64 = 40.0;
+const LEAST_SKIN: f64 = 0.05;
 
 impl Default for Contacts {
     fn default() -> Self {
@@ -41,11 +43,10 @@ impl Default for Contacts {
             kept: Kept::default(),
             hold: false,
             skin: CONTACT_SKIN,
+            farther: 0.0,
             found: Default::default(),
             solid: Vec::new(),
             reach: Reach::default(),
-            held: Vec::new(),
-            slips: Default::default(),
             clean: Default::default(),
         }
     }
@@ -53,18 +54,13 @@ impl Default for Contacts {
 
 impl Contacts {
     /// The same for another state.
-    pub fn anew(&self, bodies: &Bodies) -> Self {
-        Self { skin: self.skin, held: bodies.slips.iter().map(|slips| !slips.is_empty()).collect(), ..Self::default() }
+    pub fn anew(&self) -> Self {
+        Self { skin: self.skin, ..Self::default() }
     }
 
     /// How far lists reach that are made now.
-    pub fn list_reach(&self, model: &Model) -> Reach {
-        self.reach.and(self.skin * model.contact_diameter)
-    }
-
-    /// Lists of slots that may touch.
-    pub fn lists(&self) -> &Kept {
-        &self.kept
+    pub fn list_reach(&self) -> Reach {
+        self.reach.and(self.farther)
     }
 
     /// What stands in the state was changed from outside.
@@ -105,7 +101,7 @@ impl Cpu {
     /// Looks at bodies as they are now, for contacts in a step of `dt` (s): what laws ask of them, how near pairs matter, and whether the
     /// lists still hold.
     fn look_at_bodies(&mut self, model: &Model, dt: f64) {
-        let Contacts { kept, solid, reach, hold, .. } = &mut self.contacts;
+        let Contacts { kept, solid, reach, hold, skin, farther, .. } = &mut self.contacts;
         let b = &self.state.bodies;
         solid.resize(b.body.len(), Solid::default());
         let all = b.body.par_iter().zip(&model.contacts).zip(&self.body_radius).zip(solid).with_min_len(64).enumerate();
@@ -118,6 +114,9 @@ impl Cpu {
         let [fastest, moved] = seen.reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
         *reach = Reach::new(model, fastest, dt);
         *hold = kept.hold(moved, *reach);
+        // what hardly moves needs few candidates
+        *farther =
+            (2.0 * LASTING * fastest * dt).max(LEAST_SKIN * model.contact_diameter).min(*skin * model.contact_diameter);
     }
 
     /// Part of the stage `density`: fluid neighbours of bodies' particles, and lists of contacts where the old ones do not hold.
@@ -139,34 +138,15 @@ impl Cpu {
     /// Lists of contacts of bodies that have just been sorted.
     fn find_contacts(&mut self, model: &Model) {
         let mut found = std::mem::take(&mut self.contacts.found);
-        for (kind, found) in KINDS.into_iter().zip(&mut found) {
-            self.search(model, kind, true, found);
-        }
+        self.search(model, Kind::Rigid, true, &mut found);
         let State { particles: p, bodies: b, .. } = &mut self.state;
-        let [rigid, fixed] = KINDS.map(|kind| p.segment(kind));
-        let chunks = rigid.len().div_ceil(CHUNK);
+        let first = p.first[Kind::Rigid as usize];
         let place = |slot: usize| match self.place[slot].load(Relaxed) {
             GONE => None,
-            at if slot < b.rigid_slots => {
-                let k = at as usize - rigid.start;
-                Some((k / CHUNK, k % CHUNK))
-            }
-            at => {
-                let k = at as usize - fixed.start;
-                Some((chunks + k / CHUNK, k % CHUNK))
-            }
+            at => Some(((at as usize - first) / CHUNK, (at as usize - first) % CHUNK)),
         };
-        let reach = self.contacts.list_reach(model);
-        let kept = &mut self.contacts.kept;
-        kept.renew(model, reach, b, found.each_ref().map(|f| &f[..]), &p.id, [rigid.clone(), fixed.clone()], place);
-        // what is out of everybody's reach has slipped along nothing
-        let slips = b.slips.par_iter_mut().zip(&mut self.contacts.held).with_min_len(CHUNK).enumerate();
-        slips.for_each(|(slot, (slips, held))| {
-            if *held && !kept.busy(slot) && !b.body[b.owner[slot] as usize].asleep {
-                (*slips, *held) = (Slips::default(), false);
-            }
-        });
-        self.contacts.clean = Default::default();
+        let reach = self.contacts.list_reach();
+        self.contacts.kept.renew(model, reach, b, p, &found, &self.asleep, place);
         self.contacts.found = found;
         self.contacts.hold = true;
     }
@@ -185,9 +165,8 @@ impl Cpu {
         });
     }
 
-    /// Contacts of rigid bodies as they stand now, without fluids: for the parts of a step. What stands is left out: what it feels is the
-    /// opposite of what they do.
-    pub(super) fn touch(&mut self, model: &Model, part: Advance) {
+    /// Contacts of bodies as they stand now, without fluids: for the parts of a step.
+    pub(super) fn touch_in_part(&mut self, model: &Model, part: Advance) {
         self.look_at_bodies(model, part.dt);
         if !self.contacts.hold {
             self.asleep.clear();
@@ -195,41 +174,43 @@ impl Cpu {
             self.copy_bodies(&model.grid, Kind::Rigid);
             self.find_contacts(model);
         }
-        self.push_slots(model, part, Kind::Rigid, false);
+        self.calm();
+        if !model.fields.is_empty() {
+            self.push_slots(model, part, Kind::Rigid, false);
+        }
+        self.touch(model, part.dt);
     }
 
-    /// Part of the stage `forces`: what the particles of a kind of body feel, of contacts and, with `fluids`, of fluids.
+    /// Part of the stage `forces`: contacts of bodies in a step of `dt` (s).
+    pub(super) fn touch(&mut self, model: &Model, dt: f64) {
+        let b = &mut self.state.bodies;
+        let Contacts { kept, solid, reach, .. } = &mut self.contacts;
+        let mut rows = std::mem::take(&mut b.contacts.rows);
+        let surfaces = Surfaces { solid, stirred: &self.stirred };
+        let (bodies, level) = (&*b, self.level);
+        let input = contacts::Input { model, bodies, surfaces, reach: *reach, dt: dt as f32 };
+        let chunks = rows.par_iter_mut().zip(&mut kept.runs).enumerate();
+        chunks.filter(|(_, (rows, _))| !rows.with.is_empty()).for_each(|(c, (rows, runs))| {
+            with_scratch(|scratch| {
+                let sifted = &mut scratch.sifted;
+                dispatch!(level, simd => contacts::chunk(simd, &input, c * CHUNK, sifted, rows, runs));
+            });
+        });
+        b.contacts.rows = rows;
+    }
+
+    /// Part of the stage `forces`: what the particles of a kind of body feel of fields and, with `fluids`, of fluids.
     pub(super) fn push_slots(&mut self, model: &Model, advance: Advance, kind: Kind, fluids: bool) {
-        if kind == Kind::Rigid && !fluids {
-            self.calm();
-        }
-        let State { particles: p, bodies: b, .. } = &mut self.state;
-        let Contacts { kept, held, solid, reach, slips, clean, .. } = &mut self.contacts;
+        let p = &mut self.state.particles;
+        let Contacts { solid, clean, .. } = &mut self.contacts;
         let (rigid_first, first) = (p.first[Kind::Rigid as usize], p.first[kind as usize]);
         let segment = first..first + p.count[kind as usize];
-        let count = segment.len().div_ceil(CHUNK);
-        let which = usize::from(kind == Kind::Static);
-        let slips = &mut slips[which];
-        slips.resize_with(count, Vec::new);
-        let (of, clean) = &mut clean[which];
+        let (of, clean) = &mut clean[usize::from(kind == Kind::Static)];
         if *of != segment.len() || !model.flocks.is_empty() {
             clean.clear();
         }
         *of = segment.len();
-        clean.resize(count, false);
-        let kept = &*kept;
-        let surfaces = Surfaces {
-            slot: &p.id,
-            kept,
-            record: &b.record,
-            owner: &b.owner,
-            facing: &b.facing,
-            slips: &b.slips,
-            held,
-            solid,
-            stirred: &self.stirred,
-            reach: *reach,
-        };
+        clean.resize(segment.len().div_ceil(CHUNK), false);
         let input = forces::Input {
             model,
             records: &p.record,
@@ -238,35 +219,28 @@ impl Cpu {
             owner: &p.owner,
             first,
             particle_mass: &self.particle_mass,
-            surfaces,
+            surfaces: Surfaces { solid, stirred: &self.stirred },
             gravity: model.gravity_at(advance.end()).as_vec3(),
             dt: advance.dt as f32,
             fastest: self.ledger.speed as f32,
         };
         let (level, dry) = (self.level, NeighbourChunk::default());
         let neighbours = if fluids && !model.fluids.is_empty() { &self.neighbours[kind as usize][..] } else { &[] };
-        let stays = alone(model); // all keep their places as long as lists hold
         let fields = kind == Kind::Rigid && !model.fields.is_empty();
         let push = p.push[segment.clone()].par_chunks_mut(CHUNK);
         let touch = p.touch[segment.start - rigid_first..segment.end - rigid_first].par_chunks_mut(CHUNK);
-        push.zip(touch).zip(slips).zip(clean).enumerate().for_each(|(c, (((push, touch), slips), clean))| {
+        push.zip(touch).zip(clean).enumerate().for_each(|(c, ((push, touch), clean))| {
             let chunk = neighbours.get(c).unwrap_or(&dry);
             let first = first + c * CHUNK;
-            let out = forces::OnBodies { push, touch, slips };
-            let input = forces::Input { first, ..input };
             if chunk.found || fields {
                 *clean = false;
+                let out = forces::OnBodies { push, touch };
+                let input = forces::Input { first, ..input };
                 dispatch!(level, simd => forces::bodies(simd, input, kind, chunk, out));
-                return;
-            }
-            if !*clean {
-                out.push.fill([0.0; 3]);
-                out.touch.fill(Touch::default());
-            }
-            let idle = p.id[first..first + out.push.len()].iter().all(|&slot| !kept.busy(slot as usize));
-            *clean = idle || stays;
-            if !idle {
-                dispatch!(level, simd => forces::touches(simd, input, out));
+            } else if !*clean {
+                push.fill([0.0; 3]);
+                touch.fill(Touch::default());
+                *clean = true;
             }
         });
     }
@@ -276,43 +250,29 @@ impl Cpu {
         self.stirred.iter_mut().for_each(|s| *s.get_mut() = false);
     }
 
-    /// Sums what the particles of bodies feel; unless `all`, of rigid ones alone, who then feel contacts and fields alone.
+    /// Sums what bodies feel; unless `all`, rigid ones alone, who then feel contacts and fields alone.
     pub(super) fn bodies(&mut self, model: &Model, advance: Advance, all: bool) {
         let State { particles: p, bodies: b, .. } = &mut self.state;
-        let Contacts { kept, held, slips: found, .. } = &mut self.contacts;
-        let kept = &*kept;
+        let kept = &self.contacts.kept;
         let (place, push, touch, first) = (&self.place, &p.push, &p.touch, p.first[Kind::Rigid as usize]);
         let anywhere = if all { wet(model) } else { !model.fields.is_empty() };
-        let felt = |slot: usize| match anywhere || kept.busy(slot) {
-            false => None,
-            true => match place[slot].load(Relaxed) {
-                GONE => None,
-                at => Some((&push[at as usize], &touch[at as usize - first])),
-            },
-        };
+        let felt = anywhere.then_some(|slot: usize| match place[slot].load(Relaxed) {
+            GONE => None,
+            at => {
+                let touch = &touch[at as usize - first];
+                Some([push[at as usize], touch.fluid, touch.agents])
+            }
+        });
         let slots = 0..if all { b.record.len() } else { b.rigid_slots };
-        let gravity = model.gravity_at(advance.end());
+        let (gravity, contacts) = (model.gravity_at(advance.end()), |k: usize| kept.felt(k));
         // counted: those that begin to be so deep in others, or so fast, that they could pass
         self.ledger.fast_contacts +=
-            bodies::sum(b, &mut self.parts, slots, felt, gravity, model.dimensions, |body, before| {
+            bodies::sum(b, &mut self.parts, slots, felt, contacts, gravity, model.dimensions, |body, before| {
                 let far = body.contacts > 0 && body.v.length() * advance.dt > 0.5 * model.contact_diameter;
                 body.deep |= far && !body.is_static();
                 u64::from(body.deep && !before && !body.is_static())
             });
         joints::springs(b, model);
-        let (body, owner) = (&b.body, &b.owner);
-        let slips = b.slips.par_iter_mut().zip(held).with_min_len(CHUNK).enumerate();
-        let forgotten = slips.map(|(slot, (slips, held))| {
-            let Some((_, touch)) = felt(slot) else { return 0 };
-            if (touch.slips == 0 && !*held) || body[owner[slot] as usize].asleep {
-                return 0;
-            }
-            let at = place[slot].load(Relaxed) as usize;
-            *held = touch.slips > 0;
-            *slips = if *held { found[0][(at - first) / CHUNK][touch.slips as usize - 1] } else { Slips::default() };
-            u64::from(touch.forgotten)
-        });
-        self.ledger.forgotten_slips += forgotten.sum::<u64>();
     }
 }
 

@@ -57,7 +57,7 @@ impl Cpu {
             let part = Self::part(advance, k);
             self.move_bodies(model, part);
             if k + 1 < advance.parts {
-                self.touch(model, part);
+                self.touch_in_part(model, part);
                 self.bodies(model, part, false);
                 let outside = self.outside_seen_by_bodies(model, part);
                 self.end_part(model, part, outside, false);

@@ -6,7 +6,7 @@ use crate::integrate::sources::DrainRegion;
 use crate::model::{DtBound, Model};
 use crate::scene::joint::JointModel;
 use crate::scene::{Force, Pressure, Wall};
-use crate::state::{Body, HELD_CONTACTS, State};
+use crate::state::{Body, Contacts, State};
 use bytemuck::{Pod, Zeroable};
 use glam::{DQuat, DVec3};
 
@@ -117,6 +117,9 @@ pub struct Touch {
     pub contact: V,
     pub couple: V,
 }
+
+/// Contacts whose slip one particle remembers there: those that bear most.
+pub const HELD_CONTACTS: usize = 8;
 
 /// Slips of the contacts of a slot, as bits; last the slot of the other.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -259,6 +262,8 @@ pub struct Sizes {
     pub rigid: u32,
     /// Slots of all bodies.
     pub slots: u32,
+    /// Slots that remember slips: those of rigid bodies, where any rubs.
+    pub slipping: u32,
     /// Bodies.
     pub bodies: u32,
     /// Those that have rigid slots: they move, or follow scripts.
@@ -610,36 +615,37 @@ fn rule(model: &Model, f: &FlockConstants, clock: &crate::state::Clock) -> Rule 
     }
 }
 
-/// As in `state::Touch`.
+/// As in `state::Touch`; the forces of contacts, those of agents among them, are part of all forces there.
 pub fn to_touch(from: &Touch) -> crate::state::Touch {
-    crate::state::Touch {
-        fluid: three(from.fluid),
-        contact: three(from.contact),
-        couple: three(from.couple),
-        slips: 0,
-        contacts: from.contact[3] as u32,
-        sharers: from.fluid[3],
-        deep: from.couple[3] as u32,
-        forgotten: 0,
-    }
+    crate::state::Touch { fluid: three(from.fluid), agents: [0.0; 3] }
 }
 
-/// Slips of contacts there.
-pub fn slips(from: &crate::state::Slips) -> Slips {
-    let held = |k: usize| {
-        let [x, y, z] = from.slip[k].map(f32::to_bits);
-        [x, y, z, from.with[k]]
+/// Slips of contacts there, by rigid slot: where a slot has more than there is room for, those that have slipped farthest.
+pub fn slips(from: &Contacts, slots: usize) -> Vec<Slips> {
+    let mut held = vec![Vec::new(); slots];
+    for ([own, other], slip) in from.slipped() {
+        held.get_mut(own as usize).into_iter().for_each(|held: &mut Vec<_>| held.push((slip, other)));
+    }
+    let size = |slip: [f32; 3]| slip.iter().map(|x| x * x).sum::<f32>();
+    let slips = |mut of: Vec<([f32; 3], u32)>| {
+        of.sort_by(|a, b| size(b.0).total_cmp(&size(a.0)));
+        let mut slips = Slips { held: [[0, 0, 0, GONE]; HELD_CONTACTS] };
+        for (to, (slip, with)) in slips.held.iter_mut().zip(of) {
+            let [x, y, z] = slip.map(f32::to_bits);
+            *to = [x, y, z, with];
+        }
+        slips
     };
-    Slips { held: std::array::from_fn(held) }
+    held.into_iter().map(slips).collect()
 }
 
 /// Slips of contacts home.
-pub fn to_slips(from: &Slips) -> crate::state::Slips {
-    let mut slips = crate::state::Slips::default();
-    for (k, &[x, y, z, with]) in from.held.iter().take_while(|held| held[3] != crate::state::Slips::NONE).enumerate() {
-        (slips.with[k], slips.slip[k]) = (with, [x, y, z].map(f32::from_bits));
-    }
-    slips
+pub fn to_contacts(from: &[Slips]) -> Contacts {
+    let of = |(own, slips): (usize, &Slips)| {
+        let held = slips.held.into_iter().take_while(|held| held[3] != GONE);
+        held.map(move |[x, y, z, with]| ([own as u32, with], [x, y, z].map(f32::from_bits)))
+    };
+    Contacts::new(from.len(), from.iter().enumerate().flat_map(of))
 }
 
 #[cfg(test)]

@@ -528,7 +528,6 @@ fn to_ledger(s: &Sums, before: &Ledger) -> Ledger {
         lost: before.lost + u64::from(lost),
         rigid_lost: rigid_lost as usize,
         fast_contacts: before.fast_contacts + u64::from(fast),
-        forgotten_slips: 0,
         nonfinite: before.nonfinite + u64::from(nonfinite),
         put_back: before.put_back + s.impulse[3] as u64,
         pressed: (3.0 * number(s.fluids[3]) / f64::from(fluid.max(1))).powf(0.25),

@@ -85,6 +85,7 @@ impl Buffers {
             fluids,
             rigid,
             slots,
+            slipping: if model.rubs() { rigid } else { 0 },
             bodies: state.bodies.body.len() as u32,
             movers: state.bodies.body.iter().filter(|b| b.slots.start < state.bodies.rigid_slots).count() as u32,
             parts: parts.len() as u32,
@@ -135,7 +136,7 @@ impl Buffers {
             make("order of agents", sizes.agents as usize, 4)?,
             make("blocks of cells of agents", ((sizes.agent_cells + 2).div_ceil(BLOCK)) as usize, 4)?,
             make("flocks", 1, size_of::<Crowd>() + model.flocks.len() * size_of::<Rule>())?,
-            make("slips of contacts", 2 * state.bodies.slips.len(), size_of::<layout::Slips>())?,
+            make("slips of contacts", 2 * sizes.slipping as usize, size_of::<layout::Slips>())?,
             make("implicit pressure", 1, SOLVE_BYTES)?,
             make("bodies under implicit pressure", rounds(sizes.bodies), SWEPT_BYTES)?,
             make("places in rounds", rounds(fluids + rigid), 16)?,
@@ -177,7 +178,7 @@ impl Buffers {
         write(25, 0, bytemuck::cast_slice(&layout::agents(model, state)));
         write(41, 0, bytemuck::cast_slice(&layout::joints(model)));
         write(31, 0, &layout::crowd(model, state, sizes));
-        write(32, 0, bytemuck::cast_slice(&b.slips.iter().map(layout::slips).collect::<Vec<_>>()));
+        write(32, 0, bytemuck::cast_slice(&layout::slips(&b.contacts, sizes.slipping as usize)));
         if !p.carry.is_empty() {
             write(17, 0, bytemuck::cast_slice(&p.carry[..n]));
         }
@@ -239,9 +240,9 @@ impl Buffers {
             let rules: &[Rule] = bytemuck::cast_slice(&crowd[size_of::<Crowd>() / 4..]);
             layout::to_agents(&agents, rules, state);
         }
-        let slips: Vec<layout::Slips> = self.fetch(gpu, &self.all[32], 0, state.bodies.slips.len())?;
+        let slips: Vec<layout::Slips> = self.fetch(gpu, &self.all[32], 0, sizes.slipping as usize)?;
         let b = &mut state.bodies;
-        b.slips.iter_mut().zip(&slips).for_each(|(to, from)| *to = layout::to_slips(from));
+        b.contacts = layout::to_contacts(&slips);
         for (body, from) in b.body.iter_mut().zip(&bodies) {
             layout::to_body(from, body);
         }
