@@ -33,7 +33,7 @@ pub const BOUNDS: [DtBound; 10] = [
 ];
 
 /// The texts, in the order of the step.
-const TEXTS: [&str; 19] = [
+const TEXTS: [&str; 20] = [
     include_str!("../../laws/kernel.wgsl"),
     include_str!("../../laws/fluid.wgsl"),
     include_str!("../../laws/contact.wgsl"),
@@ -41,6 +41,7 @@ const TEXTS: [&str; 19] = [
     include_str!("../../laws/implicit.wgsl"),
     include_str!("../../laws/flock.wgsl"),
     include_str!("common.wgsl"),
+    include_str!("wide.wgsl"),
     include_str!("../../integrate/particles.wgsl"),
     include_str!("../../integrate/bodies.wgsl"),
     include_str!("../../interact/cells.wgsl"),

@@ -338,7 +338,7 @@ fn storage(gpu: &Gpu, what: &'static str, count: usize, size: usize) -> Result<w
     gpu.info.holds_all(what, count as u64, bytes)?;
     Ok(gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(what),
-        size: bytes.max(512),
+        size: bytes.max(size as u64).max(512),
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     }))
