@@ -25,7 +25,7 @@ fn velocity(b: Body, p: Wide) -> Wide {
 fn moving() -> bool { return clock.running != 0u && clock.idle == 0u; }
 // The bodies that take part in it: all at a step's end.
 fn movers() -> u32 { return select(m.count.w, m.movers.x, clock.mid != 0u); }
-fn moves(b: Body) -> bool { return b.x.w > 0.0; }
+fn moves(b: Body) -> bool { return b.x.w > 0.0 && !asleep(b); }
 fn first_kick() -> f32 { return select(clock.part, 0.5 * clock.part, LEAPFROG); }
 
 // Momenta after a force and a torque have acted for a while.
@@ -128,11 +128,12 @@ fn sum_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: ve
         own.force = vec4<f32>(f, t.contact.w);
         own.fluid = vec4<f32>(t.fluid.xyz, t.fluid.w);
         own.contact = vec4<f32>(t.contact.xyz, t.couple.w);
-        own.torque = vec4<f32>(cross(arm, f) + t.couple.xyz, 0.0);
+        own.torque = vec4<f32>(cross(arm, f) + t.couple.xyz, push[at].w);
         own.torque_fluid = vec4<f32>(cross(arm, t.fluid.xyz), 0.0);
         own.torque_contact = vec4<f32>(cross(arm, t.contact.xyz) + t.couple.xyz, 0.0);
       }
-      if (RUBS && s < m.count.y) { take_slips(s, at != GONE); }
+      // one that sleeps remembers what it knew before
+      if (RUBS && s < m.count.y && !asleep(bodies[part.body])) { take_slips(s, at != GONE); }
     }
   }
   tree[l] = own;
@@ -152,9 +153,15 @@ fn sum_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
   var s = PartSum();
   for (var p = b.counts.z; p < b.counts.z + b.counts.w; p += 1u) { s = plus(s, part_sums[p]); }
   if (FLAT) {
-    s.torque = vec4<f32>(0.0, s.torque.y, 0.0, 0.0);
+    s.torque = vec4<f32>(0.0, s.torque.y, 0.0, s.torque.w);
     s.torque_fluid = vec4<f32>(0.0, s.torque_fluid.y, 0.0, 0.0);
     s.torque_contact = vec4<f32>(0.0, s.torque_contact.y, 0.0, 0.0);
+  }
+  let stirred = select(0u, STIRRED, s.torque.w > 0.0);
+  if (asleep(b)) {
+    // what it felt last still holds
+    bodies[k].counts.y = (b.counts.y & (NEAR_THROUGH | ASLEEP)) | stirred;
+    return;
   }
   var force = s.force.xyz;
   var torque = s.torque.xyz;
@@ -173,17 +180,18 @@ fn sum_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
   bodies[k].force_contact = vec4<f32>(s.contact.xyz, 0.0);
   bodies[k].torque_fluid = vec4<f32>(s.torque_fluid.xyz, 0.0);
   bodies[k].torque_contact = vec4<f32>(s.torque_contact.xyz, 0.0);
-  // bit 0: deep now; bit 1: newly so
-  let fresh = deep && (b.counts.y & 1u) == 0u;
-  bodies[k].counts = vec4<u32>(contacts, select(0u, 1u, deep) | select(0u, 2u, fresh), b.counts.z, b.counts.w);
+  let fresh = deep && (b.counts.y & NEAR_THROUGH) == 0u;
+  let bits = select(0u, NEAR_THROUGH, deep) | select(0u, NEWLY, fresh) | stirred;
+  bodies[k].counts = vec4<u32>(contacts, bits, b.counts.z, b.counts.w);
 }
 
 // E20: the kick that ends a step.
 @compute @workgroup_size(64)
 fn kick_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
   let k = number(g, n, l, 64u);
-  if (clock.running == 0u || k >= m.count.w || clock.drag > 0.0 || !moves(bodies[k])) { return; }
-  kick_body(k, bodies[k].force.xyz, bodies[k].torque.xyz);
+  if (clock.running == 0u || k >= m.count.w || clock.drag > 0.0) { return; }
+  if (moves(bodies[k])) { kick_body(k, bodies[k].force.xyz, bodies[k].torque.xyz); }
+  doze(k);
 }
 fn kick_body(k: u32, force: vec3<f32>, torque: vec3<f32>) {
   if (!LEAPFROG) { return; }

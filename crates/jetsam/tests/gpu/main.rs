@@ -17,6 +17,7 @@ macro_rules! tests {
 mod flocks;
 mod implicit;
 mod joints;
+mod sleep;
 mod stages;
 mod steps;
 mod texts;
@@ -43,8 +44,17 @@ const ORACLE: [Test; 6] = [
 ];
 
 fn main() -> ExitCode {
-    let tests =
-        [&ORACLE, stages::TESTS, steps::TESTS, flocks::TESTS, implicit::TESTS, joints::TESTS, wide::TESTS].concat();
+    let tests = [
+        &ORACLE,
+        stages::TESTS,
+        steps::TESTS,
+        flocks::TESTS,
+        implicit::TESTS,
+        joints::TESTS,
+        sleep::TESTS,
+        wide::TESTS,
+    ]
+    .concat();
     let absent = devices().is_empty();
     let required = std::env::var("JETSAM_REQUIRE_GPU").is_ok_and(|v| v == "1");
     let trial = |(name, test): Test| {

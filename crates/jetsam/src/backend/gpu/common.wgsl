@@ -79,8 +79,8 @@ struct Body {
   torque_contact: vec4<f32>,
   law: vec4<f32>,         // ln of restitution, shared_by, face, friction
   stated: vec4<f32>,      // stiffness (or 0), damping (or negative), mass of a particle, 1 if one-way
-  shape: vec4<f32>,       // radius about the centre of mass (m)
-  counts: vec4<u32>,      // contacts, deep, first part, parts
+  shape: vec4<f32>,       // radius about the centre of mass (m), how long it has been still (s), 1 if a joint holds it
+  counts: vec4<u32>,      // contacts, what it is (bits, below), first part, parts
 }
 
 struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, owner: u32, place: u32, unused: vec2<u32> }
@@ -91,7 +91,13 @@ struct Touch { fluid: vec4<f32>, contact: vec4<f32>, couple: vec4<f32> }
 // Slips of the contacts of a slot, as bits; w: slot of the other, GONE behind the last.
 struct Slips { held: array<vec4<u32>, 8> }
 
-// Sums over a part of a body; w: contacts, sharers, deep.
+// Bits of `Body.counts.y`: some pair is so deep that it would pass through; newly so; it sleeps; something restless touches it.
+const NEAR_THROUGH: u32 = 1u;
+const NEWLY: u32 = 2u;
+const ASLEEP: u32 = 4u;
+const STIRRED: u32 = 8u;
+
+// Sums over a part of a body; w: contacts, sharers, deep, stirred.
 struct PartSum { force: vec4<f32>, fluid: vec4<f32>, contact: vec4<f32>, torque: vec4<f32>, torque_fluid: vec4<f32>, torque_contact: vec4<f32> }
 struct Part { body: u32, first: u32, end: u32, unused: u32 }
 
@@ -156,7 +162,7 @@ struct Sums {
 @group(0) @binding(1) var<storage, read_write> clock: Clock;
 @group(0) @binding(2) var<storage, read_write> records: array<Record>;      // sorted: fluid, rigid, static
 @group(0) @binding(3) var<storage, read_write> info: array<vec2<u32>>;      // sorted: id or slot, owner
-@group(0) @binding(4) var<storage, read_write> push: array<vec4<f32>>;      // sorted: acceleration or force; w: D of fluids
+@group(0) @binding(4) var<storage, read_write> push: array<vec4<f32>>;      // sorted: acceleration or force; w: D of fluids, of bodies' particles 1 if stirred
 @group(0) @binding(5) var<storage, read_write> before: array<vec4<f32>>;    // acceleration a step ago; w: neighbours (bits)
 @group(0) @binding(6) var<storage, read_write> drifted: array<Drifted>;
 @group(0) @binding(7) var<storage, read_write> starts: array<u32>;          // where cells begin, kind by kind

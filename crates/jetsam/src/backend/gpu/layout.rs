@@ -455,8 +455,8 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
             torque_contact: single(b.torque_contact, 0.0),
             law: [c.ln_restitution, c.shared_by, c.face, c.friction],
             stated: [c.stiffness, c.damping, particle as f32, f32::from(b.one_way)],
-            shape: [radius as f32, 0.0, 0.0, 0.0],
-            counts: [b.contacts, 0, first as u32, count as u32],
+            shape: [radius as f32, b.still as f32, f32::from(c.jointed), 0.0],
+            counts: [b.contacts, u32::from(b.deep) | u32::from(b.asleep) << 2, first as u32, count as u32],
         }
     };
     state.bodies.body.iter().enumerate().map(body).collect()
@@ -474,6 +474,7 @@ pub fn to_body(from: &GpuBody, body: &mut Body) {
         body.l_half = whole_vector(from.l_half.high, from.l_half.low);
         body.omega = whole_vector(p.omega, from.omega_low);
         body.sharers = from.force[3];
+        (body.still, body.asleep) = (f64::from(from.shape[1]), from.counts[1] & 4 != 0);
     }
     (body.force, body.torque) = (double(from.force), double(from.torque));
     (body.force_fluid, body.force_contact) = (double(from.force_fluid), double(from.force_contact));

@@ -76,7 +76,7 @@ fn of_body(k: u32) -> Sums {
   s.energy_low = vec4<f32>(kinetic.low.x, potential.low.x, 0.0, 0.0);
   let l = b.l.high.xyz;
   if (!(finite(b.x.x + b.x.y + b.x.z) && finite(speed) && finite(l.x + l.y + l.z))) { s.count.w = 1u; }
-  s.more.w = b.counts.y >> 1u;
+  s.more.w = select(0u, 1u, (b.counts.y & NEWLY) != 0u);
   return s;
 }
 

@@ -5,6 +5,7 @@
 
 use super::GpuError;
 use crate::gpu::Gpu;
+use crate::integrate::sleep;
 use crate::integrate::sources::Bore;
 use crate::interact::contacts::{DEEP, HELD};
 use crate::interact::pairs::SHIFTED_ABOVE;
@@ -43,7 +44,7 @@ const TEXTS: [&str; 20] = [
     include_str!("common.wgsl"),
     include_str!("wide.wgsl"),
     include_str!("../../integrate/particles.wgsl"),
-    include_str!("../../integrate/bodies.wgsl"),
+    concat!(include_str!("../../integrate/bodies.wgsl"), include_str!("../../integrate/sleep.wgsl")),
     include_str!("../../interact/cells.wgsl"),
     include_str!("../../integrate/sources.wgsl"),
     include_str!("../../interact/density.wgsl"),
@@ -97,6 +98,7 @@ pub fn text(model: &Model) -> String {
         ("PBF", s.pressure == Pressure::Pbf),
         ("FULL_DAMPING", s.damping == Damping::Full),
         ("RUBS", model.rubs()),
+        ("SLEEPS", sleep::possible(model)),
     ];
     let numbers = [
         ("NORMAL_ONLY", if s.damping == Damping::Normal { 1.0 } else { 0.0 }),
@@ -108,6 +110,8 @@ pub fn text(model: &Model) -> String {
         ("DEEP", DEEP),
         ("HELD", HELD),
         ("TRAVEL", TRAVEL as f32),
+        ("SLEEP", s.sleep as f32),
+        ("SLOW", sleep::slow(model) as f32),
     ];
     let counts = [
         ("FLUIDS", model.fluids.len().max(1)),
