@@ -20,7 +20,7 @@ use crate::state::{Body, Record, State};
 use kernels::{Over, Times};
 use layout::{Clock, GpuBody, Pose, Sizes, Sums, double};
 use program::{BOUNDS, Kernelet, Program};
-use queue::Timers;
+use queue::{Results, Timers};
 use std::collections::VecDeque;
 use std::mem::size_of;
 use std::sync::OnceLock;
@@ -81,6 +81,7 @@ struct Ready {
     stages: Vec<(Stage, Vec<(Times, Kernels)>)>,
     choose: Kernelet,
     timers: Option<Timers>,
+    results: Results,
 }
 
 /// Why a scene cannot run on a GPU yet, in words.
@@ -148,11 +149,13 @@ impl OnGpu {
                     sections.map(|(times, kernels)| (*times, kernels.iter().filter(made).map(kernel).collect()));
                 (stage, sections.collect())
             };
+            let timers = Timers::new(gpu, Stage::order(solver).len() as u32);
             Ok(Ready {
                 sizes,
                 stages: Stage::order(solver).iter().copied().map(stage).collect(),
                 choose: program.kernel(gpu, "choose", &buffers.all),
-                timers: Timers::new(gpu, Stage::order(solver).len() as u32),
+                results: Results::new(gpu, &buffers, timers.as_ref()),
+                timers,
                 buffers,
             })
         })?;
@@ -331,16 +334,7 @@ impl Backend for OnGpu {
             rounds: [0; 4],
             ..listed
         });
-        let clock = self.queue_steps(model, steps, most_parts as usize)?;
-        let (sums, ticks) = self.attempt(|gpu, ready| {
-            let done = clock.step as usize;
-            let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 1, done.max(1))?;
-            let ticks = match &ready.timers {
-                Some(timers) => timers.read(gpu, &ready.buffers)?,
-                None => Vec::new(),
-            };
-            Ok((sums[..done].to_vec(), ticks))
-        })?;
+        let queue::Frame { clock, sums, ticks } = self.queue_steps(model, steps, most_parts as usize)?;
         self.settle_births(clock);
         let mut batch = Batch::default();
         for s in &sums {
