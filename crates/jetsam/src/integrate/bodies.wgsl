@@ -111,38 +111,40 @@ fn take_slips(s: u32, inside: bool) {
   }
 }
 
-// One workgroup sums the slots of a part of a body in a fixed order, and each slot takes over the slips of its contacts.
+// One workgroup sums 128 slots, those of each part by themselves and in a fixed order (a segmented reduction), and each slot takes over
+// the slips of its contacts.
 @compute @workgroup_size(128)
 fn sum_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
-  let k = g.y * n.x + g.x;
+  let s = number(g, n, l, PART);
   var own = PartSum();
-  if (k < m.more.x && moving()) {
-    let part = parts[k];
-    let s = part.first + l;
-    if (s < part.end) {
-      let at = slots[s].place;
-      if (at != GONE) {
-        let f = push[at].xyz;
-        let t = touch[at - m.count.x];
-        let arm = turn(bodies[part.body].q, slots[s].offset.xyz);
-        own.force = vec4<f32>(f, t.contact.w);
-        own.fluid = vec4<f32>(t.fluid.xyz, t.fluid.w);
-        own.contact = vec4<f32>(t.contact.xyz, t.couple.w);
-        own.torque = vec4<f32>(cross(arm, f) + t.couple.xyz, push[at].w);
-        own.torque_fluid = vec4<f32>(cross(arm, t.fluid.xyz), 0.0);
-        own.torque_contact = vec4<f32>(cross(arm, t.contact.xyz) + t.couple.xyz, 0.0);
-      }
-      // one that sleeps remembers what it knew before
-      if (RUBS && s < m.count.y && !asleep(bodies[part.body])) { take_slips(s, at != GONE); }
+  var part = Part();
+  if (s < m.count.z && moving()) {
+    part = parts[slots[s].part];
+    let at = slots[s].place;
+    if (at != GONE) {
+      let f = push[at].xyz;
+      let t = touch[at - m.count.x];
+      let arm = turn(bodies[part.body].q, slots[s].offset.xyz);
+      own.force = vec4<f32>(f, t.contact.w);
+      own.fluid = vec4<f32>(t.fluid.xyz, t.fluid.w);
+      own.contact = vec4<f32>(t.contact.xyz, t.couple.w);
+      own.torque = vec4<f32>(cross(arm, f) + t.couple.xyz, push[at].w);
+      own.torque_fluid = vec4<f32>(cross(arm, t.fluid.xyz), 0.0);
+      own.torque_contact = vec4<f32>(cross(arm, t.contact.xyz) + t.couple.xyz, 0.0);
     }
+    // one that sleeps remembers what it knew before
+    if (RUBS && s < m.count.y && !asleep(bodies[part.body])) { take_slips(s, at != GONE); }
   }
   tree[l] = own;
   workgroupBarrier();
-  for (var reach = PART / 2u; reach > 0u; reach /= 2u) {
-    if (l < reach) { tree[l] = plus(tree[l], tree[l + reach]); }
+  for (var reach = 1u; reach < PART; reach *= 2u) {
+    let joins = s + reach < part.end;
+    if (joins) { own = plus(own, tree[l + reach]); }
+    workgroupBarrier();
+    if (joins) { tree[l] = own; }
     workgroupBarrier();
   }
-  if (l == 0u && k < m.more.x && moving()) { part_sums[k] = tree[0]; }
+  if (s == part.first && s < part.end) { part_sums[slots[s].part] = own; }
 }
 
 @compute @workgroup_size(64)

@@ -167,25 +167,28 @@ fn accelerate(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
 var<workgroup> thrusts: array<mat2x3<f32>, PART>;
 @compute @workgroup_size(128)
 fn thrust_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
-  let k = g.y * n.x + g.x;
+  let s = number(g, n, l, PART);
   var own = mat2x3<f32>();
-  if (k < m.more.x && pushes()) {
-    let part = parts[k];
-    let s = part.first + l;
-    if (s < part.end && slots[s].place != GONE) {
+  var part = Part();
+  if (s < m.count.z && pushes()) {
+    part = parts[slots[s].part];
+    if (slots[s].place != GONE) {
       let f = squeezed[slots[s].place - m.count.x].xyz;
       own = mat2x3<f32>(f, cross(turn(bodies[part.body].q, slots[s].offset.xyz), f));
     }
   }
   thrusts[l] = own;
   workgroupBarrier();
-  for (var reach = PART / 2u; reach > 0u; reach /= 2u) {
-    if (l < reach) { thrusts[l] += thrusts[l + reach]; }
+  for (var reach = 1u; reach < PART; reach *= 2u) {
+    let joins = s + reach < part.end;
+    if (joins) { own += thrusts[l + reach]; }
+    workgroupBarrier();
+    if (joins) { thrusts[l] = own; }
     workgroupBarrier();
   }
-  if (l == 0u && k < m.more.x && pushes()) {
-    part_sums[k].force = vec4<f32>(thrusts[0][0], 0.0);
-    part_sums[k].torque = vec4<f32>(thrusts[0][1], 0.0);
+  if (s == part.first && s < part.end) {
+    part_sums[slots[s].part].force = vec4<f32>(own[0], 0.0);
+    part_sums[slots[s].part].torque = vec4<f32>(own[1], 0.0);
   }
 }
 

@@ -83,7 +83,7 @@ struct Body {
   counts: vec4<u32>,      // contacts, what it is (bits, below), first part, parts
 }
 
-struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, owner: u32, place: u32, unused: vec2<u32> }
+struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, owner: u32, place: u32, part: u32, unused: u32 }
 
 // Of what the force on a body's particle consists.
 struct Touch { fluid: vec4<f32>, contact: vec4<f32>, couple: vec4<f32> }
@@ -99,6 +99,7 @@ const STIRRED: u32 = 8u;
 
 // Sums over a part of a body; w: contacts, sharers, deep, stirred.
 struct PartSum { force: vec4<f32>, fluid: vec4<f32>, contact: vec4<f32>, torque: vec4<f32>, torque_fluid: vec4<f32>, torque_contact: vec4<f32> }
+// Slots of one body among the 128 that a workgroup sums.
 struct Part { body: u32, first: u32, end: u32, unused: u32 }
 
 // Time, and what the last step left behind for this one.

@@ -10,7 +10,7 @@ use crate::state::{Body, HELD_CONTACTS, State};
 use bytemuck::{Pod, Zeroable};
 use glam::{DQuat, DVec3};
 
-/// Slots of one part of a body: a workgroup sums them.
+/// Slots that a workgroup sums: of parts of a body, or of several bodies.
 pub const PART: usize = 128;
 /// Cells of one block of the scan.
 pub const BLOCK: u32 = 2048;
@@ -137,7 +137,8 @@ pub struct Slot {
     pub facing: V,
     pub owner: u32,
     pub place: u32,
-    pub unused: [u32; 2],
+    pub part: u32,
+    pub unused: u32,
 }
 
 /// Of what the force on a body's particle consists.
@@ -297,8 +298,6 @@ pub struct Sizes {
     pub movers: u32,
     /// Parts of bodies.
     pub parts: u32,
-    /// Parts of bodies that have rigid slots.
-    pub rigid_parts: u32,
     /// Cells of the grid.
     pub cells: u32,
     /// Groups of the ledger.
@@ -433,8 +432,8 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
     let body = |(k, b): (usize, &Body)| {
         let c = &model.contacts[k];
         let inertia = b.inverse_inertia;
-        let first = parts.iter().position(|p| p[0] == k as u32).unwrap_or(0);
-        let count = b.slots.len().div_ceil(PART);
+        let first = parts.partition_point(|p| (p[1] as usize) < b.slots.start);
+        let count = parts[first..].iter().take_while(|p| p[0] == k as u32).count();
         let radius = state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max);
         let mass = if b.is_static() { 0.0 } else { b.mass };
         let particle = if b.is_static() { 0.0 } else { b.mass / b.slots.len().max(1) as f64 };
@@ -483,25 +482,28 @@ pub fn to_body(from: &GpuBody, body: &mut Body) {
     body.deep = from.counts[1] & 1 != 0;
 }
 
-/// Parts of bodies: body, first slot, end.
+/// Parts of bodies, in the order of slots: body, first slot, end; cut where a workgroup ends.
 pub fn parts(state: &State) -> Vec<[u32; 4]> {
     let cut = |(body, b): (usize, &Body)| {
         let slots = b.slots.clone();
-        slots.clone().step_by(PART).map(move |s| [body as u32, s as u32, (s + PART).min(slots.end) as u32, 0])
+        let groups = slots.start / PART..slots.end.div_ceil(PART);
+        groups.map(move |g| [body, slots.start.max(g * PART), slots.end.min((g + 1) * PART), 0].map(|n| n as u32))
     };
-    state.bodies.body.iter().enumerate().flat_map(cut).collect()
+    state.bodies.body.iter().enumerate().filter(|(_, b)| !b.slots.is_empty()).flat_map(cut).collect()
 }
 
 /// Slots; `place` of each, where it is known.
-pub fn slots(state: &State, place: impl Fn(usize) -> u32) -> Vec<Slot> {
+pub fn slots(state: &State, parts: &[[u32; 4]], place: impl Fn(usize) -> u32) -> Vec<Slot> {
     let b = &state.bodies;
+    let part = |s: usize| parts.partition_point(|p| p[2] as usize <= s) as u32;
     let slot = |s: usize| Slot {
         offset: single(b.offset[s], b.record[s].volume),
         normal: with(b.normal[s], 0.0),
         facing: with(b.facing[s], 0.0),
         owner: b.owner[s],
         place: place(s),
-        unused: [0; 2],
+        part: part(s),
+        unused: 0,
     };
     (0..b.offset.len()).map(slot).collect()
 }
@@ -705,7 +707,7 @@ mod tests {
         same!("Wide", Wide, high, low);
         same!("Drifted", Drifted, x, v, push, rate, id, owner);
         same!("Birth", Birth, x, v, room);
-        same!("Slot", Slot, offset, normal, facing, owner, place);
+        same!("Slot", Slot, offset, normal, facing, owner, place, part);
         same!("Touch", Touch, fluid, contact, couple);
         same!("Slips", Slips, held);
         same!(

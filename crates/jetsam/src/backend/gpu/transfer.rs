@@ -88,7 +88,6 @@ impl Buffers {
             bodies: state.bodies.body.len() as u32,
             movers: state.bodies.body.iter().filter(|b| b.slots.start < state.bodies.rigid_slots).count() as u32,
             parts: parts.len() as u32,
-            rigid_parts: parts.iter().filter(|part| part[1] < rigid).count() as u32,
             cells: cells as u32,
             groups: (fluids + rigid).div_ceil(512).clamp(1, GROUPS),
             agents,
@@ -172,7 +171,7 @@ impl Buffers {
         write(7, sizes.bins() as usize * 4, bytemuck::cast_slice(&walls.starts));
         write(11, 0, bytemuck::cast_slice(&layout::bodies(model, state, parts)));
         let place = |s: usize| s.checked_sub(b.rigid_slots).map_or(GONE, |k| walls.place[k]);
-        write(12, 0, bytemuck::cast_slice(&layout::slots(state, place)));
+        write(12, 0, bytemuck::cast_slice(&layout::slots(state, parts, place)));
         write(15, 0, bytemuck::cast_slice(parts));
         write(25, 0, bytemuck::cast_slice(&layout::agents(model, state)));
         write(41, 0, bytemuck::cast_slice(&layout::joints(model)));
