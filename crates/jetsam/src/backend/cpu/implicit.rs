@@ -229,12 +229,11 @@ impl Cpu {
                 });
             });
         });
-        said.iter()
-            .fold(Said::default(), |sum, s| Said {
-                error: sum.error + s.error,
-                against: sum.against + s.against,
-                bias: sum.bias + s.bias,
-            })
+        said.iter().fold(Said::default(), |sum, s| Said {
+            error: sum.error + s.error,
+            against: sum.against + s.against,
+            bias: sum.bias + s.bias,
+        })
     }
 
     /// Makes room for arrays of all particles; shares begin where `warm` says.
