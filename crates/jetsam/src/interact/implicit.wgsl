@@ -33,8 +33,7 @@ fn begin(number: u32) {
 fn begin_velocities() {
   if (clock.running == 0u) { return; }
   solve.said = vec4<f32>(0.0);
-  solve.number = VELOCITIES;   // as the errors of velocities are found, which `seen` asks after
-  solve.phase = ENDING;        // links are made now
+  solve.phase = ENDING;   // links are made now
 }
 @compute @workgroup_size(1)
 fn velocities() { if (clock.running != 0u) { begin(VELOCITIES); } }
