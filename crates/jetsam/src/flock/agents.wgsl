@@ -373,7 +373,7 @@ fn give(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u3
   if (fluid) {
     push[i] = vec4<f32>(push[i].xyz + total / m.fluids[owner].mass, push[i].w);
   } else if (any(total != vec3<f32>(0.0))) {
-    push[i] = vec4<f32>(push[i].xyz + total, 0.0);
+    push[i] = vec4<f32>(push[i].xyz + total, 1.0);
     touch[i - m.count.x].contact = vec4<f32>(touch[i - m.count.x].contact.xyz + total, touch[i - m.count.x].contact.w);
   }
 }

@@ -179,7 +179,7 @@ fn escape(rule: Rule, x: vec3<f32>, v: vec3<f32>, s: Perceived) -> vec3<f32> {
     for (var b = 0u; b < m.count.w; b += 1u) {
       if (bodies[b].x.w == 0.0) { continue; }
       let d = apart(x, bodies[b].x.xyz);
-      let gap = length(d) - bodies[b].inertia_x.w;
+      let gap = length(d) - bodies[b].shape.x;
       if (gap < sight) { total += flee_from(rule, v, d, side(max(gap, 0.0), sight)); }
     }
   }

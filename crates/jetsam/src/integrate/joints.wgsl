@@ -19,8 +19,8 @@ struct Joint {
   who: vec4<u32>,         // kind, body a, body b or GONE
 }
 
-// One end of a joint. x and rest: place and what rounding left over of it.
-struct End { x: vec3<f32>, rest: vec3<f32>, q: vec4<f32>, arm: vec3<f32>, v: vec3<f32>, omega: vec3<f32>, moves: bool, body: u32 }
+// One end of a joint. x and x_low: place and what rounding left over of it.
+struct End { x: vec3<f32>, x_low: vec3<f32>, q: vec4<f32>, arm: vec3<f32>, v: vec3<f32>, omega: vec3<f32>, moves: bool, body: u32 }
 
 fn world_end(anchor: vec3<f32>) -> End {
   return End(anchor, vec3<f32>(0.0), vec4<f32>(0.0, 0.0, 0.0, 1.0), vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0), false, GONE);
@@ -29,15 +29,15 @@ fn world_end(anchor: vec3<f32>) -> End {
 fn end_now(k: u32, anchor: vec3<f32>) -> End {
   if (k == GONE) { return world_end(anchor); }
   let b = bodies[k];
-  return End(b.x.xyz, b.rest.xyz, b.q, turn(b.q, anchor), b.v.xyz, b.omega.xyz, moves(b), k);
+  return End(b.x.xyz, b.x_low.xyz, b.q, turn(b.q, anchor), b.v.xyz, b.omega.xyz, moves(b), k);
 }
 // As the drift will leave it; the arm is that before it, at which impulses act.
 fn end_later(k: u32, anchor: vec3<f32>) -> End {
   var e = end_now(k, anchor);
   if (e.moves) {
     let b = bodies[k];
-    e.q = turned_body(b, b.l_half.xyz, clock.part).q;
-    e.v = b.p_half.xyz / b.rest.w;
+    e.q = times(turn_by(clock.part * spin_midway(b, b.l_half.high.xyz, clock.part)), b.q);
+    e.v = velocity(b, b.p_half).high.xyz;
   } else { e.v = vec3<f32>(0.0); }
   return e;
 }
@@ -115,23 +115,12 @@ fn turn_misfit(j: Joint, q_a: vec4<f32>, q_b: vec4<f32>) -> vec3<f32> {
 // Gives a the impulses and b their opposites.
 fn give_one(e: End, push: vec3<f32>, turn: vec3<f32>, half: bool) {
   let b = bodies[e.body];
-  let l = cross(e.arm, push) + turn;
+  let twist = cross(e.arm, push) + turn;
   if (half) {
-    let p = kept(b.p_half.xyz, b.p_rest.xyz, push);
-    let l_half = kept(b.l_half.xyz, b.l_rest.xyz, l);
-    bodies[e.body].p_half = vec4<f32>(p.sum, 0.0);
-    bodies[e.body].l_half = vec4<f32>(l_half.sum, 0.0);
-    bodies[e.body].p_rest = vec4<f32>(p.rest, 0.0);
-    bodies[e.body].l_rest = vec4<f32>(l_half.rest, 0.0);
+    bodies[e.body].p_half = wide_sum(b.p_half, wide_vector(push));
+    bodies[e.body].l_half = wide_sum(b.l_half, wide_vector(twist));
   } else {
-    let p = kept(b.p.xyz, b.p_rest.xyz, push);
-    let now = kept(b.l.xyz, b.l_rest.xyz, l);
-    bodies[e.body].p = vec4<f32>(p.sum, 0.0);
-    bodies[e.body].v = vec4<f32>(p.sum / b.rest.w, 0.0);
-    bodies[e.body].l = vec4<f32>(now.sum, 0.0);
-    bodies[e.body].p_rest = vec4<f32>(p.rest, 0.0);
-    bodies[e.body].l_rest = vec4<f32>(now.rest, 0.0);
-    bodies[e.body].omega = vec4<f32>(spin(b, b.q, now.sum), 0.0);
+    take_momenta(e.body, wide_sum(b.p, wide_vector(push)), wide_sum(b.l, wide_vector(twist)));
   }
 }
 fn give_both(a: End, b: End, i: Impulses, half: bool) {
@@ -147,7 +136,7 @@ fn fit_place(j: Joint) -> f32 {
   let dt = clock.part;
   var tip_b = vec3<f32>(0.0);
   if (j.who.z != GONE) { tip_b = turn(b.q, j.anchor_b.xyz); }
-  let gap = ((b.x - a.x) - (b.rest - a.rest)) + dt * (b.v - a.v) + (tip_b - turn(a.q, j.anchor_a.xyz));
+  let gap = ((b.x - a.x) + (b.x_low - a.x_low)) + dt * (b.v - a.v) + (tip_b - turn(a.q, j.anchor_a.xyz));
   let misfit = turn_misfit(j, a.q, b.q);
   give_both(a, b, impulses(j, a, b, bodies[j.who.y].q, gap / dt, misfit / dt), true);
   return max(length(gap) / m.lower.w, length(misfit));
@@ -207,7 +196,7 @@ fn joints_pull() {
     if (j.who.x != SPRING) { continue; }
     let a = end_now(j.who.y, j.anchor_a.xyz);
     let b = end_now(j.who.z, j.anchor_b.xyz);
-    let d = ((b.x - a.x) - (b.rest - a.rest)) + (b.arm - a.arm);
+    let d = ((b.x - a.x) + (b.x_low - a.x_low)) + (b.arm - a.arm);
     let v = (b.v + cross(b.omega, b.arm)) - (a.v + cross(a.omega, a.arm));
     let size = length(d);
     if (size == 0.0) { continue; }

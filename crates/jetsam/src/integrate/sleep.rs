@@ -2,7 +2,8 @@
 //!
 //! A body that has been slow for `solver.sleep` seconds, touching others and no fluid, falls asleep, unless what it touches
 //! moves. Asleep it keeps its place, has no velocity, and its particles look for no neighbours. Whatever moves and touches
-//! it, body or fluid, wakes it; if it then moves, it wakes others in turn. Nothing is known of piles as a whole.
+//! it, body or fluid, wakes it; if it then moves, it wakes others in turn. Nothing is known of piles as a whole. Its twin is
+//! sleep.wgsl.
 
 use crate::model::Model;
 use crate::state::Body;
@@ -26,6 +27,11 @@ const SLOW: f64 = 5e-3;
 /// Whether bodies sleep in a world: not without weight, nor while gravity changes.
 pub fn possible(model: &Model) -> bool {
     model.solver.sleep > 0.0 && model.gravity != DVec3::ZERO && model.shakes.is_empty() && model.fields.is_empty()
+}
+
+/// Speed below which a body is still (m/s).
+pub fn slow(model: &Model) -> f64 {
+    SLOW * (model.gravity.length() * model.spacing).sqrt()
 }
 
 /// What a body is to those that touch it.
@@ -57,9 +63,8 @@ pub fn update(body: &mut Body, model: &Model, joined: bool, stirred: bool, dt: f
     // speed of the farthest particle, by the radius of gyration: l = I omega
     let spin = body.l.dot(body.omega) / body.mass;
     let speed = (body.v.length_squared() + spin).sqrt();
-    let slow = SLOW * (model.gravity.length() * model.spacing).sqrt();
     let held = body.contacts > 0 && body.force_fluid == DVec3::ZERO;
-    body.still = if held && speed < slow { body.still + dt } else { 0.0 };
+    body.still = if held && speed < slow(model) { body.still + dt } else { 0.0 };
     if body.still >= model.solver.sleep && !stirred {
         body.asleep = true;
         (body.v, body.v_half) = (DVec3::ZERO, DVec3::ZERO);

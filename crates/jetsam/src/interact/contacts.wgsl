@@ -15,17 +15,25 @@ fn coupling_pair(fluid_mass: f32, body: u32) -> vec2<f32> {
 }
 
 // What a particle feels by contacts.
-struct Felt { force: vec3<f32>, contacts: f32, couple: vec3<f32>, sharers: f32, deep: f32, held: u32, load: array<f32, 8> }
+struct Felt { force: vec3<f32>, contacts: f32, couple: vec3<f32>, sharers: f32, deep: f32, stirred: f32, held: u32, load: array<f32, 8> }
 
-// The slip of a contact up to now (m), seen from slot `own`: the lower of two slots keeps it.
-fn slip_between(own: u32, other: u32) -> vec3<f32> {
-  let keeper = min(own, other);
-  let partner = max(own, other);
+// The slip of a contact up to now (m), as slot `keeper` remembers it; w: 1 if it does.
+fn remembered(keeper: u32, partner: u32) -> vec4<f32> {
   for (var k = 0u; k < 8u; k += 1u) {
     let held = slips[keeper].held[k];
     if (held.w == GONE) { break; }
-    if (held.w == partner) { return select(-1.0, 1.0, keeper == own) * bitcast<vec3<f32>>(held.xyz); }
+    if (held.w == partner) { return vec4<f32>(bitcast<vec3<f32>>(held.xyz), 1.0); }
   }
+  return vec4<f32>(0.0);
+}
+// The same seen from slot `own`: the lower of two slots keeps it, and whoever is awake where the other is not; what that one knew before
+// it fell asleep still counts.
+fn slip_between(own: u32, other: u32, dozes: bool) -> vec3<f32> {
+  if (own < other || dozes) {
+    let mine = remembered(own, other);
+    if (mine.w > 0.0) { return mine.xyz; }
+  }
+  if (own > other || dozes) { return -remembered(other, own).xyz; }
   return vec3<f32>(0.0);
 }
 
@@ -55,10 +63,10 @@ fn rub(felt: ptr<function, Felt>, a: Body, b: Body, pair: vec2<u32>, k: f32, par
   let k_t = TANGENTIAL * k;
   let eta_t = part * dashpot(TANGENTIAL_DAMPING, k_t / part * number, mass) / number;
   let turn = 0.5 * clock.part * dot(a.omega.xyz + b.omega.xyz, n);
-  let slip = slip_carried(slip_between(pair.x, pair.y), n, turn) + v * clock.part;
+  let slip = slip_carried(slip_between(pair.x, pair.y, asleep(b)), n, turn) + v * clock.part;
   let limit = mu * load;
   let held = friction(k_t * slip, limit);
-  if (pair.x < pair.y && k_t > 0.0) { keep(felt, pair.x, pair.y, held / k_t, load); }
+  if ((pair.x < pair.y || asleep(b)) && k_t > 0.0) { keep(felt, pair.x, pair.y, held / k_t, load); }
   return friction(held + eta_t * v, limit);
 }
 
@@ -90,6 +98,8 @@ fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kin
     let inverse_mass = a.x.w + bodies[body].x.w;
     if (inverse_mass == 0.0 || joined(owner, body)) { continue; }
     let b = bodies[body];
+    let stirs = SLEEPS && restless(b) && !restless(a);
+    if (asleep(a) && !stirs) { continue; }
     let r = sqrt(r_sq);
     let other_slot = info[j].x;
     var n = d / max(r, 1e-12);
@@ -131,6 +141,7 @@ fn add_contacts(felt: ptr<function, Felt>, i: u32, x: vec3<f32>, owner: u32, kin
     if (s < diameter) {
       (*felt).contacts += 1.0;
       (*felt).sharers += part;
+      if (stirs) { (*felt).stirred = 1.0; }
       if (RUBS) {
         let pair = vec2<u32>(own_slot, other_slot);
         f += rub(felt, a, b, pair, k.x * part, part, counted, v - n * speed, max(-dot(f, n), 0.0), n);

@@ -146,6 +146,11 @@ fn forces_body(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
   let own = records[i];
   let x = own.x.xyz;
   let owner = info[i].y;
+  if (asleep(bodies[owner])) {
+    felt_by(i, k, vec3<f32>(0.0));
+    if (is_wet(x)) { push[i].w = 1.0; }
+    return;
+  }
   let limit = m.upper.w * m.upper.w;
   var sum = Pairs();
   var pushed = vec3<f32>(0.0);
@@ -175,13 +180,19 @@ fn felt_by(i: u32, k: u32, by_fluid: vec3<f32>) {
   let owner = info[i].y;
   var felt = Felt();
   add_contacts(&felt, i, x, owner, RIGID);
+  if (asleep(bodies[owner])) {
+    // nothing new, but for what wakes it
+    push[i] = vec4<f32>(0.0, 0.0, 0.0, felt.stirred);
+    touch[k] = Touch();
+    return;
+  }
   add_contacts(&felt, i, x, owner, STATIC);
   var force = by_fluid + felt.force;
   if (RUBS && k < m.count.y && felt.held < 8u) { slips[m.count.y + info[i].x].held[felt.held].w = GONE; }
   if (bodies[owner].x.w > 0.0) {
     force += bodies[owner].stated.z * fields_at(x, records[i].v.xyz);
   }
-  push[i] = vec4<f32>(force, 0.0);
+  push[i] = vec4<f32>(force, felt.stirred);
   touch[k] = Touch(vec4<f32>(by_fluid, felt.sharers), vec4<f32>(felt.force, felt.contacts),
                    vec4<f32>(felt.couple, felt.deep));
 }

@@ -85,7 +85,7 @@ fn flow_of_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) 
   var omega = b.omega.xyz;
   if (yields(b)) {
     v += clock.dt * b.x.w * (b.force.xyz - b.force_contact.xyz);
-    omega = spin(b, b.q, b.l.xyz + clock.dt * (b.torque.xyz - b.torque_contact.xyz));
+    omega = spin(b, b.q, b.l.high.xyz + clock.dt * (b.torque.xyz - b.torque_contact.xyz));
   } else if (clock.drag > 0.0) {
     v = vec3<f32>(0.0);
     omega = v;
@@ -167,25 +167,28 @@ fn accelerate(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
 var<workgroup> thrusts: array<mat2x3<f32>, PART>;
 @compute @workgroup_size(128)
 fn thrust_parts(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
-  let k = g.y * n.x + g.x;
+  let s = number(g, n, l, PART);
   var own = mat2x3<f32>();
-  if (k < m.more.x && pushes()) {
-    let part = parts[k];
-    let s = part.first + l;
-    if (s < part.end && slots[s].place != GONE) {
+  var part = Part();
+  if (s < m.count.z && pushes()) {
+    part = parts[slots[s].part];
+    if (slots[s].place != GONE) {
       let f = squeezed[slots[s].place - m.count.x].xyz;
       own = mat2x3<f32>(f, cross(turn(bodies[part.body].q, slots[s].offset.xyz), f));
     }
   }
   thrusts[l] = own;
   workgroupBarrier();
-  for (var reach = PART / 2u; reach > 0u; reach /= 2u) {
-    if (l < reach) { thrusts[l] += thrusts[l + reach]; }
+  for (var reach = 1u; reach < PART; reach *= 2u) {
+    let joins = s + reach < part.end;
+    if (joins) { own += thrusts[l + reach]; }
+    workgroupBarrier();
+    if (joins) { thrusts[l] = own; }
     workgroupBarrier();
   }
-  if (l == 0u && k < m.more.x && pushes()) {
-    part_sums[k].force = vec4<f32>(thrusts[0][0], 0.0);
-    part_sums[k].torque = vec4<f32>(thrusts[0][1], 0.0);
+  if (s == part.first && s < part.end) {
+    part_sums[slots[s].part].force = vec4<f32>(own[0], 0.0);
+    part_sums[slots[s].part].torque = vec4<f32>(own[1], 0.0);
   }
 }
 
@@ -346,22 +349,12 @@ fn shift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   swept[k].added_torque += by.twist;
   if (!moves(b) || b.stated.w > 0.0) { swept[k].impulse -= dt * by.thrust; }
   if (!yields(b) || !COUPLED_BY_PRESSURE) { return; }
-  let p = kept(b.p_half.xyz, b.p_rest.xyz, dt * by.thrust.xyz);
-  let l_half = kept(b.l_half.xyz, b.l_rest.xyz, dt * by.twist.xyz);
-  let x = kept(b.x.xyz, b.rest.xyz, dt * dt * by.push.xyz);
-  bodies[k].p_half = vec4<f32>(p.sum, 0.0);
-  bodies[k].p_rest = vec4<f32>(p.rest, 0.0);
-  bodies[k].l_half = vec4<f32>(l_half.sum, 0.0);
-  bodies[k].l_rest = vec4<f32>(l_half.rest, 0.0);
-  bodies[k].p = b.p + dt * by.thrust;
-  bodies[k].v = b.v + dt * by.push;
-  bodies[k].l = b.l + dt * by.twist;
-  bodies[k].omega = vec4<f32>(spin(b, b.q, b.l.xyz + dt * by.twist.xyz), 0.0);
-  bodies[k].x = vec4<f32>(home_all(x.sum), b.x.w);
-  bodies[k].rest = vec4<f32>(x.rest, b.rest.w);
-  let turned = turned_on(b.q, b.q_rest, dt * dt * by.spin.xyz);
-  bodies[k].q = turned.q;
-  bodies[k].q_rest = turned.rest;
+  bodies[k].p_half = pushed_on(b.p_half, by.thrust.xyz, dt);
+  bodies[k].l_half = pushed_on(b.l_half, by.twist.xyz, dt);
+  take_place(k, pushed_on(Wide(b.x, b.x_low), by.push.xyz, dt * dt));
+  let turned = wide_times(wide_turn_by(wide_vector(dt * dt * by.spin.xyz)), Wide(b.q, b.q_low));
+  take_orientation(k, wide_unit(turned));
+  take_momenta(k, pushed_on(b.p, by.thrust.xyz, dt), pushed_on(b.l, by.twist.xyz, dt));
 }
 // Slots follow their bodies where those are in the midst of a solve.
 @compute @workgroup_size(128)

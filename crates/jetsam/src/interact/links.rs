@@ -472,7 +472,8 @@ mod tests {
     #[test]
     fn links_lead_to_the_neighbours() {
         let halo = vec![[40, 90, 40], [200, 230, 150], [1000, 1100, 920]];
-        let mut links = Links { unit: 0.5, movers: 1.0, links: vec![Link::default()], used: 0, ends: vec![1], halo: halo.clone() };
+        let mut links =
+            Links { unit: 0.5, movers: 1.0, links: vec![Link::default()], used: 0, ends: vec![1], halo: halo.clone() };
         let index: [u32; LANES] = std::array::from_fn(|l| [45, 89, 200, 229, 1000, 1099][l % 6]);
         let mut e: [Lanes; 3] = std::array::from_fn(|a| std::array::from_fn(|l| (l as f32 - 7.3) * (a as f32 - 0.9)));
         links.push(&index, &mut e);

@@ -177,7 +177,8 @@ fn implicit_rounds_end_at_the_tolerance_or_at_the_budget() {
             most = most.max(p.iterations).max(d.iterations);
             true
         });
-        assert!(most > 4 && most < 1000, "{solver}: {most} rounds"); // four are queued at first
+        // four are queued at first: more were asked for. By Chebyshev's rounds DFSPH needs seven, too few for a floor of eight
+        assert!(most > 4 && most < 1000, "{solver}: {most} rounds");
         let mut w = dam("iterations = 2\ntolerance = 1e-6\ndivergence_tolerance = 1e-6");
         w.advance(0.05, |w, _| {
             let (p, d) = (w.ledger().pressure, w.ledger().divergence);

@@ -17,9 +17,11 @@ macro_rules! tests {
 mod flocks;
 mod implicit;
 mod joints;
+mod sleep;
 mod stages;
 mod steps;
 mod texts;
+mod wide;
 
 use common::{oracle, scene};
 use jetsam::World;
@@ -42,7 +44,17 @@ const ORACLE: [Test; 6] = [
 ];
 
 fn main() -> ExitCode {
-    let tests = [&ORACLE, stages::TESTS, steps::TESTS, flocks::TESTS, implicit::TESTS, joints::TESTS].concat();
+    let tests = [
+        &ORACLE,
+        stages::TESTS,
+        steps::TESTS,
+        flocks::TESTS,
+        implicit::TESTS,
+        joints::TESTS,
+        sleep::TESTS,
+        wide::TESTS,
+    ]
+    .concat();
     let absent = devices().is_empty();
     let required = std::env::var("JETSAM_REQUIRE_GPU").is_ok_and(|v| v == "1");
     let trial = |(name, test): Test| {

@@ -30,7 +30,7 @@ struct Constants {
   far_corner: vec4<f32>,  // the other end of the domain (m); w: longest step of implicit pressure (s)
   kernel: vec4<f32>,      // factors of W, of G; W at one spacing, W at no distance
   tune: vec4<f32>,        // factor of the Laplacian; softening (m^2); XSPH; shifting
-  contact: vec4<f32>,     // square of the rate (1/s^2) that makes springs of masses; vorticity times spacing (m); 1;
+  contact: vec4<f32>,     // square of the rate (1/s^2) that makes springs of masses; vorticity times spacing (m); unused;
                           // pressure up to which gravity fades out between fluids and bodies (Pa)
   step: vec4<f32>,        // courant, courant_force (implicit pressure: way of a step (m), factor of `pressed`), bound that does not
                           // change (s), stated dt (s) or 0
@@ -39,7 +39,7 @@ struct Constants {
   cells: vec4<u32>,       // cells on each axis; w: their number
   count: vec4<u32>,       // capacity of fluids, slots of rigid bodies, slots of all bodies, bodies
   more: vec4<u32>,        // parts of bodies, blocks of the scan, groups of the ledger, axes that are open (bits)
-  movers: vec4<u32>,      // bodies that have rigid slots, joints
+  movers: vec4<u32>,      // bodies that have rigid slots; w: 0, which no compiler knows
   fluids: array<Fluid, FLUIDS>,
   fields: array<Field, FIELDS>,
   hoses: array<Hose, HOSES>,
@@ -56,22 +56,21 @@ struct Drifted { x: vec4<f32>, v: vec4<f32>, push: vec4<f32>, rate: vec4<f32>, i
 
 struct Body {
   x: vec4<f32>,           // centre of mass (m); w: 1/mass as forces feel it, 0 if they do not move it
-  rest: vec4<f32>,        // what rounding left over of x; w: mass (kg), 0 if forces do not move it
+  x_low: vec4<f32>,       // what rounding left over of both
   q: vec4<f32>,           // orientation
   v: vec4<f32>,
   omega: vec4<f32>,
   acceleration: vec4<f32>,            // of scripts, else 0
   angular_acceleration: vec4<f32>,
-  p: vec4<f32>,           // momentum: sums of what bodies exchange cancel to the last bit
-  p_half: vec4<f32>,
-  l: vec4<f32>,
-  l_half: vec4<f32>,
-  p_rest: vec4<f32>,      // what rounding left over of both
-  l_rest: vec4<f32>,
-  q_rest: vec4<f32>,      // and of q
-  inertia_x: vec4<f32>,   // columns of the inverse inertia in the body's axes
-  inertia_y: vec4<f32>,
-  inertia_z: vec4<f32>,
+  q_low: vec4<f32>,       // what rounding left over of q, and of omega
+  omega_low: vec4<f32>,
+  p: Wide,                // momentum: sums of what bodies exchange cancel to the last bit; w: mass (kg), 0 if forces do not move it
+  p_half: Wide,
+  l: Wide,
+  l_half: Wide,
+  inertia_x: Wide,        // columns of the inverse inertia in the body's axes
+  inertia_y: Wide,
+  inertia_z: Wide,
   force: vec4<f32>,       // w: contacts that share its load
   torque: vec4<f32>,
   force_fluid: vec4<f32>,
@@ -80,10 +79,11 @@ struct Body {
   torque_contact: vec4<f32>,
   law: vec4<f32>,         // ln of restitution, shared_by, face, friction
   stated: vec4<f32>,      // stiffness (or 0), damping (or negative), mass of a particle, 1 if one-way
-  counts: vec4<u32>,      // contacts, deep, first part, parts
+  shape: vec4<f32>,       // radius about the centre of mass (m), how long it has been still (s), 1 if a joint holds it
+  counts: vec4<u32>,      // contacts, what it is (bits, below), first part, parts
 }
 
-struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, owner: u32, place: u32, unused: vec2<u32> }
+struct Slot { offset: vec4<f32>, normal: vec4<f32>, facing: vec4<f32>, owner: u32, place: u32, part: u32, unused: u32 }
 
 // Of what the force on a body's particle consists.
 struct Touch { fluid: vec4<f32>, contact: vec4<f32>, couple: vec4<f32> }
@@ -91,8 +91,15 @@ struct Touch { fluid: vec4<f32>, contact: vec4<f32>, couple: vec4<f32> }
 // Slips of the contacts of a slot, as bits; w: slot of the other, GONE behind the last.
 struct Slips { held: array<vec4<u32>, 8> }
 
-// Sums over a part of a body; w: contacts, sharers, deep.
+// Bits of `Body.counts.y`: some pair is so deep that it would pass through; newly so; it sleeps; something restless touches it.
+const NEAR_THROUGH: u32 = 1u;
+const NEWLY: u32 = 2u;
+const ASLEEP: u32 = 4u;
+const STIRRED: u32 = 8u;
+
+// Sums over a part of a body; w: contacts, sharers, deep, stirred.
 struct PartSum { force: vec4<f32>, fluid: vec4<f32>, contact: vec4<f32>, torque: vec4<f32>, torque_fluid: vec4<f32>, torque_contact: vec4<f32> }
+// Slots of one body among the 128 that a workgroup sums.
 struct Part { body: u32, first: u32, end: u32, unused: u32 }
 
 // Time, and what the last step left behind for this one.
@@ -140,6 +147,7 @@ struct Swept {
 struct Sums {
   step: vec4<f32>,         // dt, bound (as bits), largest speed, largest acceleration
   energy: vec4<f32>,       // kinetic, potential, sum of |force|, largest speed of a body's particle
+  energy_low: vec4<f32>,   // what rounding left over of the sums in it
   momentum: vec4<f32>,     // w: sum of |p|
   outer: vec4<f32>,     // w: sum of density errors
   total: vec4<f32>,        // w: largest density error
@@ -155,7 +163,7 @@ struct Sums {
 @group(0) @binding(1) var<storage, read_write> clock: Clock;
 @group(0) @binding(2) var<storage, read_write> records: array<Record>;      // sorted: fluid, rigid, static
 @group(0) @binding(3) var<storage, read_write> info: array<vec2<u32>>;      // sorted: id or slot, owner
-@group(0) @binding(4) var<storage, read_write> push: array<vec4<f32>>;      // sorted: acceleration or force; w: D of fluids
+@group(0) @binding(4) var<storage, read_write> push: array<vec4<f32>>;      // sorted: acceleration or force; w: D of fluids, of bodies' particles 1 if stirred
 @group(0) @binding(5) var<storage, read_write> before: array<vec4<f32>>;    // acceleration a step ago; w: neighbours (bits)
 @group(0) @binding(6) var<storage, read_write> drifted: array<Drifted>;
 @group(0) @binding(7) var<storage, read_write> starts: array<u32>;          // where cells begin, kind by kind
@@ -276,6 +284,11 @@ fn home(x: f32, lower: f32, upper: f32, period: f32) -> f32 {
   }
   return at;
 }
+// What brings a place back into the domain: a period, exactly.
+fn way_home(x: vec3<f32>) -> vec3<f32> {
+  if (!PERIODIC) { return vec3<f32>(0.0); }
+  return m.period.xyz * (vec3<f32>(x < m.lower.xyz) - vec3<f32>(x >= m.upper.xyz));
+}
 fn home_all(x: vec3<f32>) -> vec3<f32> {
   if (!PERIODIC) { return x; }
   return vec3<f32>(home(x.x, m.lower.x, m.upper.x, m.period.x), home(x.y, m.lower.y, m.upper.y, m.period.y),
@@ -368,12 +381,14 @@ fn scan_group(l: u32, own: u32) -> vec2<u32> {
   return result;
 }
 
-// A sum and what rounding left over of it (Kahan 1965). Some drivers take (a + b) - a for b: the factor of 1, which they do not know,
-// keeps them from it.
+// What has been rounded, and no compiler sees through it: see wide.wgsl.
+fn rounded(x: vec4<f32>) -> vec4<f32> { return bitcast<vec4<f32>>(bitcast<vec4<u32>>(x) ^ vec4<u32>(m.movers.w)); }
+
+// A sum and what rounding left over of it (Kahan 1965).
 struct Kept { sum: vec3<f32>, rest: vec3<f32> }
 fn kept(sum: vec3<f32>, rest: vec3<f32>, more: vec3<f32>) -> Kept {
   let y = more - rest;
-  let t = (sum + y) * m.contact.z;
+  let t = rounded(vec4<f32>(sum + y, 0.0)).xyz;
   return Kept(t, (t - sum) - y);
 }
 
@@ -385,17 +400,8 @@ fn turn(q: vec4<f32>, v: vec3<f32>) -> vec3<f32> {
 fn times(a: vec4<f32>, b: vec4<f32>) -> vec4<f32> {
   return vec4<f32>(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
 }
-// The rotation by an angle less the one that does nothing, exact where it is small.
-fn turned_more(angle: vec3<f32>) -> vec4<f32> {
+// The turn by a vector (rad).
+fn turn_by(angle: vec3<f32>) -> vec4<f32> {
   let size = length(angle);
-  let quarter = sin(0.25 * size);
-  return vec4<f32>(angle * select(sin(0.5 * size) / size, 0.5, size < 1e-6), -2.0 * quarter * quarter);
-}
-// An orientation turned further, with what rounding left over of it, and brought back to length 1: small turns about one axis are lost
-// otherwise, while it turns fast about another.
-struct Orientation { q: vec4<f32>, rest: vec4<f32> }
-fn turned_on(q: vec4<f32>, rest: vec4<f32>, angle: vec3<f32>) -> Orientation {
-  let y = times(turned_more(angle), q) - 0.5 * (dot(q, q) - 1.0) * q - rest;
-  let t = (q + y) * m.contact.z;
-  return Orientation(t, (t - q) - y);
+  return vec4<f32>(angle * select(sin(0.5 * size) / size, 0.5, size < 1e-6), cos(0.5 * size));
 }

@@ -25,7 +25,7 @@ pub enum Over {
     Bodies(u32),
     /// Those that have rigid slots.
     Movers(u32),
-    /// Parts of bodies, one workgroup each.
+    /// Parts of bodies, those of 128 slots to a workgroup.
     Parts,
     /// Those of rigid slots.
     RigidParts,

@@ -10,7 +10,7 @@ use crate::state::{Body, Contacts, State};
 use bytemuck::{Pod, Zeroable};
 use glam::{DQuat, DVec3};
 
-/// Slots of one part of a body: a workgroup sums them.
+/// Slots that a workgroup sums: of parts of a body, or of several bodies.
 pub const PART: usize = 128;
 /// Cells of one block of the scan.
 pub const BLOCK: u32 = 2048;
@@ -60,19 +60,49 @@ pub struct Drifted {
     pub unused: [u32; 2],
 }
 
+/// Numbers of two floats, as in `wide.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Wide {
+    pub high: V,
+    pub low: V,
+}
+
+impl Wide {
+    /// The nearest to four numbers.
+    fn of(numbers: [f64; 4]) -> Self {
+        let high = numbers.map(|n| n as f32);
+        Self { high, low: std::array::from_fn(|k| (numbers[k] - f64::from(high[k])) as f32) }
+    }
+
+    fn vector(v: DVec3, w: f64) -> Self {
+        Self::of([v.x, v.y, v.z, w])
+    }
+}
+
+/// Four numbers from what is left of them after rounding, and what rounding left over.
+fn whole(high: V, low: V) -> [f64; 4] {
+    std::array::from_fn(|k| f64::from(high[k]) + f64::from(low[k]))
+}
+
+/// The first three.
+fn whole_vector(high: V, low: V) -> DVec3 {
+    let [x, y, z, _] = whole(high, low);
+    DVec3::new(x, y, z)
+}
+
 /// A body.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct GpuBody {
     pub pose: Pose,
-    pub p: V,
-    pub p_half: V,
-    pub l: V,
-    pub l_half: V,
-    pub p_rest: V,
-    pub l_rest: V,
-    pub q_rest: V,
-    pub inertia: [V; 3],
+    pub q_low: V,
+    pub omega_low: V,
+    pub p: Wide,
+    pub p_half: Wide,
+    pub l: Wide,
+    pub l_half: Wide,
+    pub inertia: [Wide; 3],
     pub force: V,
     pub torque: V,
     pub force_fluid: V,
@@ -81,6 +111,7 @@ pub struct GpuBody {
     pub torque_contact: V,
     pub law: V,
     pub stated: V,
+    pub shape: V,
     pub counts: [u32; 4],
 }
 
@@ -89,7 +120,7 @@ pub struct GpuBody {
 #[repr(C)]
 pub struct Pose {
     pub x: V,
-    pub rest: V,
+    pub x_low: V,
     pub q: V,
     pub v: V,
     pub omega: V,
@@ -106,7 +137,8 @@ pub struct Slot {
     pub facing: V,
     pub owner: u32,
     pub place: u32,
-    pub unused: [u32; 2],
+    pub part: u32,
+    pub unused: u32,
 }
 
 /// Of what the force on a body's particle consists.
@@ -178,6 +210,7 @@ pub struct Birth {
 pub struct Sums {
     pub step: V,
     pub energy: V,
+    pub energy_low: V,
     pub momentum: V,
     pub outer: V,
     pub total: V,
@@ -270,8 +303,6 @@ pub struct Sizes {
     pub movers: u32,
     /// Parts of bodies.
     pub parts: u32,
-    /// Parts of bodies that have rigid slots.
-    pub rigid_parts: u32,
     /// Cells of the grid.
     pub cells: u32,
     /// Groups of the ledger.
@@ -315,7 +346,7 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         far_corner: single(g.max, model.longest_step() as f32),
         kernel: [f.w, f.g, f.w_spacing, f.w_own],
         tune: [f.laplacian, model.softening(), s.xsph as f32, s.shifting as f32],
-        contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 1.0, model.hold_limit()],
+        contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 0.0, model.hold_limit()],
         step: [steps[0] as f32, steps[1] as f32, least(&others), s.dt.unwrap_or(0.0) as f32],
         rounds: [model.tolerance() as f32, s.divergence_tolerance as f32, model.budget() as f32, least(&contact)],
         relax: [
@@ -389,12 +420,10 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
 
 /// The pose of a body.
 pub fn pose(body: &Body) -> Pose {
-    let (inverse, mass) = if body.is_static() { (0.0, 0.0) } else { (1.0 / body.mass, body.mass) };
-    let x = body.x.as_vec3();
+    let x = Wide::vector(body.x, if body.is_static() { 0.0 } else { 1.0 / body.mass });
     Pose {
-        x: with(x, inverse as f32),
-        // the place is x - rest
-        rest: single(x.as_dvec3() - body.x, mass as f32),
+        x: x.high,
+        x_low: x.low,
         q: body.q.as_quat().to_array(),
         v: single(body.v, 0.0),
         omega: single(body.omega, 0.0),
@@ -403,32 +432,25 @@ pub fn pose(body: &Body) -> Pose {
     }
 }
 
-/// What rounding to single precision leaves over: to be taken from what is kept.
-fn left_over(v: DVec3) -> DVec3 {
-    v.as_vec3().as_dvec3() - v
-}
-
 /// Bodies with the parts that `first` and `count` tell.
 pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> {
     let body = |(k, b): (usize, &Body)| {
         let c = &model.contacts[k];
         let inertia = b.inverse_inertia;
-        let first = parts.iter().position(|p| p[0] == k as u32).unwrap_or(0);
-        let count = b.slots.len().div_ceil(PART);
+        let first = parts.partition_point(|p| (p[1] as usize) < b.slots.start);
+        let count = parts[first..].iter().take_while(|p| p[0] == k as u32).count();
         let radius = state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max);
         let mass = if b.is_static() { 0.0 } else { b.mass };
-        let p = mass * b.v;
         let particle = if b.is_static() { 0.0 } else { b.mass / b.slots.len().max(1) as f64 };
         GpuBody {
             pose: pose(b),
-            p: single(p, 0.0),
-            p_half: single(mass * b.v_half, 0.0),
-            l: single(b.l, 0.0),
-            l_half: single(b.l_half, 0.0),
-            p_rest: single(left_over(p), 0.0),
-            l_rest: single(left_over(b.l), 0.0),
-            q_rest: (b.q.as_quat().as_dquat() - b.q).as_quat().to_array(),
-            inertia: [single(inertia.x_axis, radius as f32), single(inertia.y_axis, 0.0), single(inertia.z_axis, 0.0)],
+            q_low: Wide::of(b.q.to_array()).low,
+            omega_low: Wide::vector(b.omega, 0.0).low,
+            p: Wide::vector(mass * b.v, mass),
+            p_half: Wide::vector(mass * b.v_half, mass),
+            l: Wide::vector(b.l, 0.0),
+            l_half: Wide::vector(b.l_half, 0.0),
+            inertia: [inertia.x_axis, inertia.y_axis, inertia.z_axis].map(|column| Wide::vector(column, 0.0)),
             force: single(b.force, b.sharers),
             torque: single(b.torque, 0.0),
             force_fluid: single(b.force_fluid, 0.0),
@@ -437,7 +459,8 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
             torque_contact: single(b.torque_contact, 0.0),
             law: [c.ln_restitution, c.shared_by, c.face, c.friction],
             stated: [c.stiffness, c.damping, particle as f32, f32::from(b.one_way)],
-            counts: [b.contacts, 0, first as u32, count as u32],
+            shape: [radius as f32, b.still as f32, f32::from(c.jointed), 0.0],
+            counts: [b.contacts, u32::from(b.deep) | u32::from(b.asleep) << 2, first as u32, count as u32],
         }
     };
     state.bodies.body.iter().enumerate().map(body).collect()
@@ -447,12 +470,15 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
 pub fn to_body(from: &GpuBody, body: &mut Body) {
     let p = &from.pose;
     if !body.is_static() {
-        body.x = double(p.x) - double(p.rest);
-        body.q = DQuat::from_array(p.q.map(f64::from)) - DQuat::from_array(from.q_rest.map(f64::from));
-        (body.v, body.omega) = ((double(from.p) - double(from.p_rest)) / body.mass, double(p.omega));
-        (body.l, body.l_half) = (double(from.l) - double(from.l_rest), double(from.l_half));
-        body.v_half = double(from.p_half) / body.mass;
+        body.x = whole_vector(p.x, p.x_low);
+        body.q = DQuat::from_array(whole(p.q, from.q_low));
+        body.v = whole_vector(from.p.high, from.p.low) / body.mass;
+        body.v_half = whole_vector(from.p_half.high, from.p_half.low) / body.mass;
+        body.l = whole_vector(from.l.high, from.l.low);
+        body.l_half = whole_vector(from.l_half.high, from.l_half.low);
+        body.omega = whole_vector(p.omega, from.omega_low);
         body.sharers = from.force[3];
+        (body.still, body.asleep) = (f64::from(from.shape[1]), from.counts[1] & 4 != 0);
     }
     (body.force, body.torque) = (double(from.force), double(from.torque));
     (body.force_fluid, body.force_contact) = (double(from.force_fluid), double(from.force_contact));
@@ -461,25 +487,28 @@ pub fn to_body(from: &GpuBody, body: &mut Body) {
     body.deep = from.counts[1] & 1 != 0;
 }
 
-/// Parts of bodies: body, first slot, end.
+/// Parts of bodies, in the order of slots: body, first slot, end; cut where a workgroup ends.
 pub fn parts(state: &State) -> Vec<[u32; 4]> {
     let cut = |(body, b): (usize, &Body)| {
         let slots = b.slots.clone();
-        slots.clone().step_by(PART).map(move |s| [body as u32, s as u32, (s + PART).min(slots.end) as u32, 0])
+        let groups = slots.start / PART..slots.end.div_ceil(PART);
+        groups.map(move |g| [body, slots.start.max(g * PART), slots.end.min((g + 1) * PART), 0].map(|n| n as u32))
     };
-    state.bodies.body.iter().enumerate().flat_map(cut).collect()
+    state.bodies.body.iter().enumerate().filter(|(_, b)| !b.slots.is_empty()).flat_map(cut).collect()
 }
 
 /// Slots; `place` of each, where it is known.
-pub fn slots(state: &State, place: impl Fn(usize) -> u32) -> Vec<Slot> {
+pub fn slots(state: &State, parts: &[[u32; 4]], place: impl Fn(usize) -> u32) -> Vec<Slot> {
     let b = &state.bodies;
+    let part = |s: usize| parts.partition_point(|p| p[2] as usize <= s) as u32;
     let slot = |s: usize| Slot {
         offset: single(b.offset[s], b.record[s].volume),
         normal: with(b.normal[s], 0.0),
         facing: with(b.facing[s], 0.0),
         owner: b.owner[s],
         place: place(s),
-        unused: [0; 2],
+        part: part(s),
+        unused: 0,
     };
     (0..b.offset.len()).map(slot).collect()
 }
@@ -681,9 +710,10 @@ mod tests {
                 assert_eq!(span as usize, size_of::<$rust>(), "{}", $wgsl);
             }};
         }
+        same!("Wide", Wide, high, low);
         same!("Drifted", Drifted, x, v, push, rate, id, owner);
         same!("Birth", Birth, x, v, room);
-        same!("Slot", Slot, offset, normal, facing, owner, place);
+        same!("Slot", Slot, offset, normal, facing, owner, place, part);
         same!("Touch", Touch, fluid, contact, couple);
         same!("Slips", Slips, held);
         same!(
@@ -723,7 +753,9 @@ mod tests {
         for (name, bytes) in [("Solve", SOLVE_BYTES), ("Swept", SWEPT_BYTES), ("Node", NODE_BYTES)] {
             assert_eq!(layout(&module, name).1 as usize, bytes, "{name}");
         }
-        same!("Sums", Sums, step, energy, momentum, outer, total, crossed, count, more, impulse, fluids, said);
+        same!(
+            "Sums", Sums, step, energy, energy_low, momentum, outer, total, crossed, count, more, impulse, fluids, said
+        );
         same!("Agent", Agent, x, v, next, rest, force, drag, own, felt);
         same!(
             "Rule", Rule, lead_x, lead_v, goal, radii, limits, pull, drive, fear, sense, body, matter, time, kind, who,
@@ -732,13 +764,12 @@ mod tests {
         same!(
             "Body",
             GpuBody,
+            q_low,
+            omega_low,
             p,
             p_half,
             l,
             l_half,
-            p_rest,
-            l_rest,
-            q_rest,
             force,
             torque,
             force_fluid,
@@ -747,6 +778,7 @@ mod tests {
             torque_contact,
             law,
             stated,
+            shape,
             counts
         );
         let (body, _) = layout(&module, "Body");

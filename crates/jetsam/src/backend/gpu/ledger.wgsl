@@ -3,10 +3,14 @@
 const GROUP: u32 = 128u;
 var<workgroup> partial: array<Sums, 64>;
 
+// The sums of energy in it.
+fn energies(s: Sums) -> Wide { return Wide(vec4<f32>(s.energy.xyz, 0.0), s.energy_low); }
+
 fn both(a: Sums, b: Sums) -> Sums {
+  let energy = wide_sum(energies(a), energies(b));
   return Sums(
     vec4<f32>(0.0, 0.0, max(a.step.z, b.step.z), max(a.step.w, b.step.w)),
-    vec4<f32>(a.energy.xyz + b.energy.xyz, max(a.energy.w, b.energy.w)),
+    vec4<f32>(energy.high.xyz, max(a.energy.w, b.energy.w)), energy.low,
     a.momentum + b.momentum, a.outer + b.outer,
     vec4<f32>(a.total.xyz + b.total.xyz, max(a.total.w, b.total.w)),
     a.crossed + b.crossed, a.count + b.count, a.more + b.more, a.impulse + b.impulse, a.fluids + b.fluids, a.said + b.said);
@@ -58,16 +62,21 @@ fn of_body(k: u32) -> Sums {
     s.outer = vec4<f32>(-b.force.xyz, 0.0);
     return s;
   }
-  let mass = b.rest.w;
+  let mass = b.p.high.w;
   let speed = length(b.v.xyz);
   s.momentum = mass * vec4<f32>(b.v.xyz, speed);
   s.total += vec4<f32>(b.force.xyz, 0.0);
   var outside = mass * clock.gravity.xyz;
   if (b.stated.w > 0.0) { outside -= b.force_fluid.xyz; }
   s.outer = vec4<f32>(outside, 0.0);
-  s.energy += vec4<f32>(0.5 * (mass * speed * speed + dot(b.l.xyz, b.omega.xyz)), -mass * dot(m.gravity.xyz, b.x.xyz - m.corner.xyz), length(b.force.xyz), 0.0);
-  if (!(finite(b.x.x + b.x.y + b.x.z) && finite(speed) && finite(b.l.x + b.l.y + b.l.z))) { s.count.w = 1u; }
-  s.more.w = b.counts.y >> 1u;
+  let kinetic = scaled(wide_sum(wide_dot(b.p, velocity(b, b.p)), wide_dot(b.l, Wide(b.omega, b.omega_low))), 0.5);
+  let weight = wide_product(wide_vector(-m.gravity.xyz), Wide(b.p.high.wwww, b.p.low.wwww));
+  let potential = wide_dot(weight, wide_sum(Wide(b.x, b.x_low), wide_vector(-m.corner.xyz)));
+  s.energy += vec4<f32>(kinetic.high.x, potential.high.x, length(b.force.xyz), 0.0);
+  s.energy_low = vec4<f32>(kinetic.low.x, potential.low.x, 0.0, 0.0);
+  let l = b.l.high.xyz;
+  if (!(finite(b.x.x + b.x.y + b.x.z) && finite(speed) && finite(l.x + l.y + l.z))) { s.count.w = 1u; }
+  s.more.w = select(0u, 1u, (b.counts.y & NEWLY) != 0u);
   return s;
 }
 

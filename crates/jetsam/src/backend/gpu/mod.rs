@@ -20,7 +20,7 @@ use crate::state::{Body, Record, State};
 use kernels::{Over, Times};
 use layout::{Clock, GpuBody, Pose, Sizes, Sums, double};
 use program::{BOUNDS, Kernelet, Program};
-use queue::Timers;
+use queue::{Results, Timers};
 use std::collections::VecDeque;
 use std::mem::size_of;
 use std::sync::OnceLock;
@@ -81,6 +81,7 @@ struct Ready {
     stages: Vec<(Stage, Vec<(Times, Kernels)>)>,
     choose: Kernelet,
     timers: Option<Timers>,
+    results: Results,
 }
 
 /// Why a scene cannot run on a GPU yet, in words.
@@ -148,11 +149,13 @@ impl OnGpu {
                     sections.map(|(times, kernels)| (*times, kernels.iter().filter(made).map(kernel).collect()));
                 (stage, sections.collect())
             };
+            let timers = Timers::new(gpu, Stage::order(solver).len() as u32);
             Ok(Ready {
                 sizes,
                 stages: Stage::order(solver).iter().copied().map(stage).collect(),
                 choose: program.kernel(gpu, "choose", &buffers.all),
-                timers: Timers::new(gpu, Stage::order(solver).len() as u32),
+                results: Results::new(gpu, &buffers, timers.as_ref()),
+                timers,
                 buffers,
             })
         })?;
@@ -331,16 +334,7 @@ impl Backend for OnGpu {
             rounds: [0; 4],
             ..listed
         });
-        let clock = self.queue_steps(model, steps, most_parts as usize)?;
-        let (sums, ticks) = self.attempt(|gpu, ready| {
-            let done = clock.step as usize;
-            let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 1, done.max(1))?;
-            let ticks = match &ready.timers {
-                Some(timers) => timers.read(gpu, &ready.buffers)?,
-                None => Vec::new(),
-            };
-            Ok((sums[..done].to_vec(), ticks))
-        })?;
+        let queue::Frame { clock, sums, ticks } = self.queue_steps(model, steps, most_parts as usize)?;
         self.settle_births(clock);
         let mut batch = Batch::default();
         for s in &sums {
@@ -482,8 +476,8 @@ fn groups(over: Over, s: Sizes) -> u32 {
         Over::Blocks => s.blocks(),
         Over::Bodies(size) => s.bodies.div_ceil(size),
         Over::Movers(size) => s.movers.div_ceil(size),
-        Over::Parts => s.parts,
-        Over::RigidParts => s.rigid_parts,
+        Over::Parts => s.slots.div_ceil(layout::PART as u32),
+        Over::RigidParts => s.rigid.div_ceil(layout::PART as u32),
         Over::Groups => s.groups,
         Over::Agents(size) => s.agents.div_ceil(size),
         Over::AgentCells(size) => (s.agent_cells + 2).div_ceil(size),
@@ -516,8 +510,8 @@ fn to_ledger(s: &Sums, before: &Ledger) -> Ledger {
         external_impulse: double(s.impulse),
         total_force: double(s.total),
         force_scale: number(s.energy[2]),
-        kinetic: number(s.energy[0]),
-        potential: number(s.energy[1]),
+        kinetic: number(s.energy[0]) + number(s.energy_low[0]),
+        potential: number(s.energy[1]) + number(s.energy_low[1]),
         density_error_mean: number(s.outer[3]) / f64::from(full.max(1)),
         density_error_max: number(s.total[3]),
         neighbours: number(s.crossed[3]) / f64::from(fluid.max(1)),

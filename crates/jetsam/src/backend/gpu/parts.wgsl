@@ -161,6 +161,7 @@ fn end_part(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec
     swept[k].added_torque = vec4<f32>(0.0);
     return;
   }
+  if (asleep(bodies[k])) { doze(k); return; }
   let force = bodies[k].force + way * (by.steady - fluid);
   let torque = bodies[k].torque + way * (by.steady_torque - fluid_torque);
   if (moves(bodies[k])) { kick_body(k, force.xyz, torque.xyz); }
@@ -172,4 +173,5 @@ fn end_part(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec
   bodies[k].torque = torque + way * (now_torque - by.steady_torque);
   bodies[k].force_fluid = now;
   bodies[k].torque_fluid = now_torque;
+  doze(k);
 }

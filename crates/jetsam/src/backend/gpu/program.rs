@@ -5,6 +5,7 @@
 
 use super::GpuError;
 use crate::gpu::Gpu;
+use crate::integrate::sleep;
 use crate::integrate::sources::Bore;
 use crate::interact::contacts::{DEEP, HELD};
 use crate::interact::pairs::SHIFTED_ABOVE;
@@ -33,7 +34,7 @@ pub const BOUNDS: [DtBound; 10] = [
 ];
 
 /// The texts, in the order of the step.
-const TEXTS: [&str; 19] = [
+const TEXTS: [&str; 20] = [
     include_str!("../../laws/kernel.wgsl"),
     include_str!("../../laws/fluid.wgsl"),
     include_str!("../../laws/contact.wgsl"),
@@ -41,8 +42,9 @@ const TEXTS: [&str; 19] = [
     include_str!("../../laws/implicit.wgsl"),
     include_str!("../../laws/flock.wgsl"),
     include_str!("common.wgsl"),
+    include_str!("wide.wgsl"),
     include_str!("../../integrate/particles.wgsl"),
-    include_str!("../../integrate/bodies.wgsl"),
+    concat!(include_str!("../../integrate/bodies.wgsl"), include_str!("../../integrate/sleep.wgsl")),
     include_str!("../../interact/cells.wgsl"),
     include_str!("../../integrate/sources.wgsl"),
     include_str!("../../interact/density.wgsl"),
@@ -96,6 +98,7 @@ pub fn text(model: &Model) -> String {
         ("PBF", s.pressure == Pressure::Pbf),
         ("FULL_DAMPING", s.damping == Damping::Full),
         ("RUBS", model.rubs()),
+        ("SLEEPS", sleep::possible(model)),
     ];
     let numbers = [
         ("NORMAL_ONLY", if s.damping == Damping::Normal { 1.0 } else { 0.0 }),
@@ -107,6 +110,8 @@ pub fn text(model: &Model) -> String {
         ("DEEP", DEEP),
         ("HELD", HELD),
         ("TRAVEL", TRAVEL as f32),
+        ("SLEEP", s.sleep as f32),
+        ("SLOW", sleep::slow(model) as f32),
     ];
     let counts = [
         ("FLUIDS", model.fluids.len().max(1)),

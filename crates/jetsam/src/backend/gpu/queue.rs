@@ -3,9 +3,9 @@
 //! In: kernels made for a scene. Out: commands, and what the device says of time. Called by the backend's `run` and `queue`.
 
 use super::kernels::Times;
-use super::layout::Clock;
+use super::layout::{Clock, Sums};
 use super::program::Kernelet;
-use super::transfer::Buffers;
+use super::transfer::{Buffers, Home, arrive};
 use super::{OnGpu, Ready, SOLVES, SUBMITTED};
 use crate::gpu::{Gpu, GpuError};
 use crate::integrate::Advance;
@@ -17,18 +17,65 @@ use std::time::Duration;
 pub(super) struct Timers {
     ticks: wgpu::QuerySet,
     resolved: wgpu::Buffer,
-    home: wgpu::Buffer,
+    stages: usize,
+}
+
+/// Where the results of a frame come home: with one wait.
+pub(super) struct Results {
+    clock: Home,
+    log: Home,
+    ticks: Option<Home>,
+}
+
+/// What a frame left behind: its clock, what each step said, time of each stage in one step.
+pub(super) struct Frame {
+    pub clock: Clock,
+    pub sums: Vec<Sums>,
+    pub ticks: Vec<Duration>,
+}
+
+impl Results {
+    pub(super) fn new(gpu: &Gpu, buffers: &Buffers, timers: Option<&Timers>) -> Self {
+        let size = size_of::<Sums>() as u64;
+        Self {
+            clock: Home::new(gpu, buffers.clock(), 0, size_of::<Clock>() as u64),
+            log: Home::new(gpu, buffers.log(), size, buffers.log().size() - size),
+            ticks: timers.map(|t| Home::new(gpu, &t.resolved, 0, t.resolved.size())),
+        }
+    }
+
+    /// Sends them, of so many steps at most.
+    fn send(&self, commands: &mut wgpu::CommandEncoder, steps: usize) {
+        self.clock.send(commands, size_of::<Clock>() as u64);
+        self.log.send(commands, (steps * size_of::<Sums>()) as u64);
+        if let Some(ticks) = &self.ticks {
+            ticks.send(commands, ticks.bytes());
+        }
+    }
+
+    /// Waits for them.
+    fn receive(&self, gpu: &Gpu, timers: Option<&Timers>) -> Result<Frame, GpuError> {
+        let homes: Vec<&Home> = [&self.clock, &self.log].into_iter().chain(&self.ticks).collect();
+        arrive(gpu, &homes)?;
+        let clock = self.clock.read::<Clock>(gpu, 1)?[0];
+        let sums = self.log.read(gpu, clock.step as usize)?;
+        let ticks = match (&self.ticks, timers) {
+            (Some(ticks), Some(timers)) => timers.spans(gpu, &ticks.read(gpu, 2 * timers.stages)?),
+            _ => Vec::new(),
+        };
+        Ok(Frame { clock, sums, ticks })
+    }
 }
 
 impl OnGpu {
-    /// Queues so many steps, and waits for them. Where the rounds of a solve did not suffice the device has stopped in the midst of a
+    /// Queues so many steps, and waits for their results. Where the rounds of a solve did not suffice the device has stopped in the midst of a
     /// step, and is told to go on with more.
-    pub(super) fn queue_steps(&mut self, model: &Model, steps: usize, parts: usize) -> Option<Clock> {
+    pub(super) fn queue_steps(&mut self, model: &Model, steps: usize, parts: usize) -> Option<Frame> {
         let at_once = if model.implicit() { 1 } else { SUBMITTED };
         let (mut done, mut from, mut measured) = (0, None, false);
         loop {
             let rounds = self.rounds;
-            let clock = self.attempt(|gpu, ready| {
+            let frame = self.attempt(|gpu, ready| {
                 let mut made = done;
                 while made < steps {
                     let mut commands = gpu.device.create_command_encoder(&Default::default());
@@ -37,16 +84,19 @@ impl OnGpu {
                         let timers = ready.timers.as_ref().filter(|_| step == 0 && !measured);
                         ready.step(&mut commands, begin, rounds, parts, timers);
                     }
-                    gpu.queue.submit([commands.finish()]);
                     made += at_once;
+                    if made >= steps {
+                        ready.results.send(&mut commands, steps);
+                    }
+                    gpu.queue.submit([commands.finish()]);
                 }
-                Ok(ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1)?[0])
+                ready.results.receive(gpu, ready.timers.as_ref())
             })?;
             measured = true;
-            done = clock.step as usize;
-            from = self.resume(model, clock);
+            done = frame.clock.step as usize;
+            from = self.resume(model, frame.clock);
             if from.is_none() {
-                return Some(clock);
+                return Some(frame);
             }
         }
     }
@@ -179,20 +229,19 @@ fn run_one(pass: &mut wgpu::ComputePass, kernel: &Kernelet, [x, y]: [u32; 2]) {
 impl Timers {
     pub(super) fn new(gpu: &Gpu, stages: u32) -> Option<Self> {
         let count = 2 * stages;
-        let bytes = 8 * u64::from(count);
-        let buffer = |label, usage| {
-            let descriptor =
-                wgpu::BufferDescriptor { label: Some(label), size: bytes, usage, mapped_at_creation: false };
-            gpu.device.create_buffer(&descriptor)
-        };
         gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY).then(|| Self {
             ticks: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("stages"),
                 ty: wgpu::QueryType::Timestamp,
                 count,
             }),
-            resolved: buffer("ticks", wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
-            home: buffer("ticks at home", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+            resolved: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("ticks"),
+                size: 8 * u64::from(count),
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            }),
+            stages: stages as usize,
         })
     }
 
@@ -207,14 +256,12 @@ impl Timers {
 
     fn resolve(&self, commands: &mut wgpu::CommandEncoder) {
         commands.resolve_query_set(&self.ticks, 0..(self.resolved.size() / 8) as u32, &self.resolved, 0);
-        commands.copy_buffer_to_buffer(&self.resolved, 0, &self.home, 0, self.resolved.size());
     }
 
     /// Time of each stage in the step that was measured.
-    pub(super) fn read(&self, gpu: &Gpu, buffers: &Buffers) -> Result<Vec<Duration>, GpuError> {
-        let ticks: Vec<u64> = buffers.mapped(gpu, &self.home)?;
+    fn spans(&self, gpu: &Gpu, ticks: &[u64]) -> Vec<Duration> {
         let period = f64::from(gpu.queue.get_timestamp_period());
         let span = |t: &[u64]| Duration::from_nanos((t[1].saturating_sub(t[0]) as f64 * period) as u64);
-        Ok(ticks.chunks_exact(2).map(span).collect())
+        ticks.chunks_exact(2).map(span).collect()
     }
 }

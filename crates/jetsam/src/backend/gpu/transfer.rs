@@ -89,7 +89,6 @@ impl Buffers {
             bodies: state.bodies.body.len() as u32,
             movers: state.bodies.body.iter().filter(|b| b.slots.start < state.bodies.rigid_slots).count() as u32,
             parts: parts.len() as u32,
-            rigid_parts: parts.iter().filter(|part| part[1] < rigid).count() as u32,
             cells: cells as u32,
             groups: (fluids + rigid).div_ceil(512).clamp(1, GROUPS),
             agents,
@@ -173,7 +172,7 @@ impl Buffers {
         write(7, sizes.bins() as usize * 4, bytemuck::cast_slice(&walls.starts));
         write(11, 0, bytemuck::cast_slice(&layout::bodies(model, state, parts)));
         let place = |s: usize| s.checked_sub(b.rigid_slots).map_or(GONE, |k| walls.place[k]);
-        write(12, 0, bytemuck::cast_slice(&layout::slots(state, place)));
+        write(12, 0, bytemuck::cast_slice(&layout::slots(state, parts, place)));
         write(15, 0, bytemuck::cast_slice(parts));
         write(25, 0, bytemuck::cast_slice(&layout::agents(model, state)));
         write(41, 0, bytemuck::cast_slice(&layout::joints(model)));
@@ -190,21 +189,63 @@ impl Buffers {
         }
     }
 
-    /// Brings the state home.
+    /// Brings the state home, all of it at once.
     pub fn download(&self, gpu: &Gpu, sizes: Sizes, state: &mut State) -> Result<(), GpuError> {
         let (cap, cells) = (sizes.fluids as usize, sizes.cells as usize);
-        let starts: Vec<u32> = self.fetch(gpu, &self.all[7], 0, sizes.bins() as usize)?;
-        let clock: Vec<layout::Clock> = self.fetch(gpu, self.clock(), 0, 1)?;
+        let all = cap + sizes.slots as usize;
+        let fluid_or = |wanted: bool| if wanted { cap } else { 0 };
+        let p = &state.particles;
+        let aged = !(p.rate.is_empty() && p.born.is_empty());
+        let crowd_bytes = size_of::<Crowd>() + state.agents.clock.len() * size_of::<Rule>();
+        let wanted = [
+            (7, sizes.bins() as usize * 4),
+            (1, size_of::<layout::Clock>()),
+            (2, all * size_of::<Record>()),
+            (3, all * 8),
+            (4, all * 16),
+            (5, cap * 16),
+            (13, sizes.slots as usize * size_of::<Touch>()),
+            (12, sizes.slots as usize * size_of::<Slot>()),
+            (11, sizes.bodies as usize * size_of::<GpuBody>()),
+            (17, fluid_or(!p.carry.is_empty()) * 16),
+            (18, fluid_or(aged) * 16),
+            (19, fluid_or(!p.gradient.is_empty()) * 16),
+            (20, fluid_or(!p.gradient.is_empty()) * 16),
+            (25, sizes.agents as usize * size_of::<Agent>()),
+            (31, if sizes.agents > 0 { crowd_bytes } else { 0 }),
+            (32, sizes.slipping as usize * size_of::<layout::Slips>()),
+        ];
+        let homes = wanted.map(|(binding, bytes)| Home::new(gpu, &self.all[binding], 0, bytes as u64));
+        send_and_wait(gpu, &homes)?;
+        let [
+            starts,
+            clock,
+            records,
+            info,
+            push,
+            before,
+            touch,
+            slots,
+            bodies,
+            carry,
+            rates,
+            gradient,
+            curls,
+            agents,
+            crowd,
+            slips,
+        ] = &homes;
+        let starts: Vec<u32> = starts.read(gpu, sizes.bins() as usize)?;
+        let clock: Vec<layout::Clock> = clock.read(gpu, 1)?;
         let live = if clock[0].step > 0 || starts[cells] > 0 { starts[cells] as usize } else { clock[0].live as usize };
         let rigid = (starts[2 * cells + BINS as usize] as usize).saturating_sub(cap);
-        let all = cap + sizes.slots as usize;
-        let records: Vec<Record> = self.fetch(gpu, &self.all[2], 0, all)?;
-        let info: Vec<[u32; 2]> = self.fetch(gpu, &self.all[3], 0, all)?;
-        let push: Vec<[f32; 4]> = self.fetch(gpu, &self.all[4], 0, all)?;
-        let before: Vec<[f32; 4]> = self.fetch(gpu, &self.all[5], 0, cap)?;
-        let touch: Vec<Touch> = self.fetch(gpu, &self.all[13], 0, sizes.slots as usize)?;
-        let slots: Vec<Slot> = self.fetch(gpu, &self.all[12], 0, sizes.slots as usize)?;
-        let bodies: Vec<GpuBody> = self.fetch(gpu, &self.all[11], 0, sizes.bodies as usize)?;
+        let records: Vec<Record> = records.read(gpu, all)?;
+        let info: Vec<[u32; 2]> = info.read(gpu, all)?;
+        let push: Vec<[f32; 4]> = push.read(gpu, all)?;
+        let before: Vec<[f32; 4]> = before.read(gpu, cap)?;
+        let touch: Vec<Touch> = touch.read(gpu, sizes.slots as usize)?;
+        let slots: Vec<Slot> = slots.read(gpu, sizes.slots as usize)?;
+        let bodies: Vec<GpuBody> = bodies.read(gpu, sizes.bodies as usize)?;
         let p = &mut state.particles;
         p.count = [live, rigid, (sizes.slots - sizes.rigid) as usize];
         let segments = Kind::ALL.into_iter().flat_map(|kind| p.segment(kind));
@@ -221,26 +262,25 @@ impl Buffers {
             *to = layout::to_touch(from);
         }
         if !p.carry.is_empty() {
-            p.carry[..live].copy_from_slice(&self.fetch(gpu, &self.all[17], 0, live)?);
+            p.carry[..live].copy_from_slice(&carry.read(gpu, live)?);
         }
-        if !(p.rate.is_empty() && p.born.is_empty()) {
-            let rates: Vec<[f32; 4]> = self.fetch(gpu, &self.all[18], 0, live)?;
+        if aged {
+            let rates: Vec<[f32; 4]> = rates.read(gpu, live)?;
             p.rate.iter_mut().zip(&rates).for_each(|(to, r)| *to = [r[0], r[1]]);
             p.born.iter_mut().zip(&rates).for_each(|(to, r)| *to = r[2]);
         }
         if !p.gradient.is_empty() {
-            p.gradient[..live].copy_from_slice(&self.fetch(gpu, &self.all[19], 0, live)?);
-            let curls: Vec<[f32; 4]> = self.fetch(gpu, &self.all[20], 0, live)?;
+            p.gradient[..live].copy_from_slice(&gradient.read(gpu, live)?);
+            let curls: Vec<[f32; 4]> = curls.read(gpu, live)?;
             p.vorticity.iter_mut().zip(curls).for_each(|(to, from)| *to = three(from));
         }
         if sizes.agents > 0 {
-            let agents: Vec<Agent> = self.fetch(gpu, &self.all[25], 0, sizes.agents as usize)?;
-            let bytes = size_of::<Crowd>() + state.agents.clock.len() * size_of::<Rule>();
-            let crowd: Vec<u32> = self.fetch(gpu, &self.all[31], 0, bytes / 4)?;
+            let agents: Vec<Agent> = agents.read(gpu, sizes.agents as usize)?;
+            let crowd: Vec<u32> = crowd.read(gpu, crowd_bytes / 4)?;
             let rules: &[Rule] = bytemuck::cast_slice(&crowd[size_of::<Crowd>() / 4..]);
             layout::to_agents(&agents, rules, state);
         }
-        let slips: Vec<layout::Slips> = self.fetch(gpu, &self.all[32], 0, sizes.slipping as usize)?;
+        let slips: Vec<layout::Slips> = slips.read(gpu, sizes.slipping as usize)?;
         let b = &mut state.bodies;
         b.contacts = layout::to_contacts(&slips);
         for (body, from) in b.body.iter_mut().zip(&bodies) {
@@ -263,8 +303,11 @@ impl Buffers {
 
     /// Brings bodies and agents home.
     pub fn movers(&self, gpu: &Gpu, sizes: Sizes) -> Result<(Vec<GpuBody>, Vec<Agent>), GpuError> {
-        let bodies = self.fetch(gpu, &self.all[11], 0, sizes.bodies as usize)?;
-        Ok((bodies, self.fetch(gpu, &self.all[25], 0, sizes.agents as usize)?))
+        let (bodies, agents) = (sizes.bodies as usize, sizes.agents as usize);
+        let wanted = [(11, bodies * size_of::<GpuBody>()), (25, agents * size_of::<Agent>())];
+        let homes = wanted.map(|(binding, bytes): (usize, usize)| Home::new(gpu, &self.all[binding], 0, bytes as u64));
+        send_and_wait(gpu, &homes)?;
+        Ok((homes[0].read(gpu, bodies)?, homes[1].read(gpu, agents)?))
     }
 
     /// The clock.
@@ -300,37 +343,77 @@ impl Buffers {
         first: usize,
         count: usize,
     ) -> Result<Vec<T>, GpuError> {
-        if count == 0 {
-            return Ok(Vec::new());
-        }
-        let bytes = (count * size_of::<T>()) as u64;
-        let home = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        let home = Home::new(gpu, from, (first * size_of::<T>()) as u64, (count * size_of::<T>()) as u64);
+        send_and_wait(gpu, std::slice::from_ref(&home))?;
+        home.read(gpu, count)
+    }
+}
+
+/// A piece of a buffer, and room for it on the host's side.
+pub struct Home {
+    from: wgpu::Buffer,
+    at: u64,
+    bytes: u64,
+    room: wgpu::Buffer,
+}
+
+impl Home {
+    /// Makes room.
+    pub fn new(gpu: &Gpu, from: &wgpu::Buffer, at: u64, bytes: u64) -> Self {
+        let room = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("at home"),
-            size: bytes,
+            size: bytes.max(4),
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let mut commands = gpu.device.create_command_encoder(&Default::default());
-        commands.copy_buffer_to_buffer(from, (first * size_of::<T>()) as u64, &home, 0, bytes);
-        gpu.queue.submit([commands.finish()]);
-        self.mapped(gpu, &home)
+        Self { from: from.clone(), at, bytes, room }
     }
 
-    /// Waits for the device and reads a whole buffer that can be mapped.
-    pub fn mapped<T: Pod>(&self, gpu: &Gpu, home: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
-        let (sender, receiver) = std::sync::mpsc::channel();
-        home.map_async(wgpu::MapMode::Read, .., move |outcome| {
+    /// How many bytes there are.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Sends the first so many bytes on their way.
+    pub fn send(&self, commands: &mut wgpu::CommandEncoder, bytes: u64) {
+        if bytes > 0 {
+            commands.copy_buffer_to_buffer(&self.from, self.at, &self.room, 0, bytes);
+        }
+    }
+
+    /// The first so many items, once they have arrived. They can then be sent anew.
+    pub fn read<T: Pod>(&self, gpu: &Gpu, count: usize) -> Result<Vec<T>, GpuError> {
+        let view = self.room.get_mapped_range(..).map_err(|e| gpu.refused(e))?;
+        let items = view.chunks_exact(size_of::<T>()).take(count).map(bytemuck::pod_read_unaligned).collect();
+        drop(view);
+        self.room.unmap();
+        Ok(items)
+    }
+}
+
+/// Brings pieces home, all at once.
+fn send_and_wait(gpu: &Gpu, homes: &[Home]) -> Result<(), GpuError> {
+    let mut commands = gpu.device.create_command_encoder(&Default::default());
+    homes.iter().for_each(|home| home.send(&mut commands, home.bytes));
+    gpu.queue.submit([commands.finish()]);
+    arrive(gpu, &homes.iter().collect::<Vec<_>>())
+}
+
+/// Waits for the device, once for all that was sent.
+pub fn arrive(gpu: &Gpu, homes: &[&Home]) -> Result<(), GpuError> {
+    let (sender, receiver) = std::sync::mpsc::channel();
+    for home in homes {
+        let sender = sender.clone();
+        home.room.map_async(wgpu::MapMode::Read, .., move |outcome| {
             // No one listens once the wait below has failed.
             let _ = sender.send(outcome);
         });
-        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| gpu.refused(e))?;
-        receiver.recv_timeout(PATIENCE).map_err(|e| gpu.refused(e))?.map_err(|e| gpu.refused(e))?;
-        let view = home.get_mapped_range(..).map_err(|e| gpu.refused(e))?;
-        let items = view.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect();
-        drop(view);
-        home.unmap();
-        Ok(items)
     }
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| gpu.refused(e))?;
+    for _ in homes {
+        receiver.recv_timeout(PATIENCE).map_err(|e| gpu.refused(e))?.map_err(|e| gpu.refused(e))?;
+    }
+    Ok(())
 }
 
 /// A buffer for kernels to read and write; never empty, and full of zeros.
@@ -339,7 +422,7 @@ fn storage(gpu: &Gpu, what: &'static str, count: usize, size: usize) -> Result<w
     gpu.info.holds_all(what, count as u64, bytes)?;
     Ok(gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(what),
-        size: bytes.max(512),
+        size: bytes.max(size as u64).max(512),
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     }))
