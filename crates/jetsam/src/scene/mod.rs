@@ -163,7 +163,7 @@ pub struct Solver {
     #[serde(default = "d::divergence_tolerance")]
     pub divergence_tolerance: f64,
     /// Most iterations of implicit pressure in a step, of each kind (E9): a budget for real time. On one below 24 fluids yield under PBF:
-    /// 4 leave about 1 % of compression, 8 about 0.3 %.
+    /// 4 leave about 1.3 % of compression, 8 about 0.4 %.
     #[serde(default = "d::iterations")]
     pub iterations: f64,
     /// How density is found (E1).
