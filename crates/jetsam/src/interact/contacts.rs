@@ -157,16 +157,17 @@ fn meet(input: &Input, runs: &mut Runs) {
     for ((run, law), sum) in runs.run.iter().zip(&mut runs.law).zip(&mut runs.sum) {
         let [a, b] = run.body.map(|body| &solid[body as usize]);
         let law = &mut law.0;
-        law[2..5].copy_from_slice(&a.spin.to_array());
-        law[5..8].copy_from_slice(&b.spin.to_array());
-        law[8] = 1.0 / (a.inverse_mass + b.inverse_mass);
-        law[9] = Model::ln_restitution(a.inverse_mass, a.ln_restitution, b.inverse_mass, b.ln_restitution);
-        law[10] = a.shared_by.max(b.shared_by);
-        law[11] = a.face.max(b.face);
-        law[12] = Model::friction_of(a.friction, b.friction);
-        law[13] = a.stiffness.max(b.stiffness);
-        law[14] = a.damping.max(b.damping);
-        law[15] = a.sharers.max(b.sharers);
+        law[SPIN[0] - LANES..][..3].copy_from_slice(&a.spin.to_array());
+        law[SPIN[1] - LANES..][..3].copy_from_slice(&b.spin.to_array());
+        law[MASS - LANES] = 1.0 / (a.inverse_mass + b.inverse_mass);
+        law[LN_RESTITUTION - LANES] =
+            Model::ln_restitution(a.inverse_mass, a.ln_restitution, b.inverse_mass, b.ln_restitution);
+        law[SHARED_BY - LANES] = a.shared_by.max(b.shared_by);
+        law[FACE - LANES] = a.face.max(b.face);
+        law[RUBS - LANES] = Model::friction_of(a.friction, b.friction);
+        law[STIFFNESS - LANES] = a.stiffness.max(b.stiffness);
+        law[DAMPING - LANES] = a.damping.max(b.damping);
+        law[COUNTED - LANES] = a.sharers.max(b.sharers);
         sum.felt = [0.0; 9];
         sum.apart = if periodic { apart(input.model, input.bodies, run.slot) } else { b.x - a.x };
     }
