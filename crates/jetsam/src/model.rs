@@ -515,6 +515,11 @@ impl Model {
         s.iterations.min(((0.25 + product).sqrt() - 0.5).ceil())
     }
 
+    /// Whether rounds have a coarse level: not on a budget, whose fluid yields as far as its rounds alone reach.
+    pub fn coarse(&self) -> bool {
+        self.solver.coarse && (self.solver.pressure != Pressure::Pbf || self.budget() >= ROOM)
+    }
+
     /// Mean compression at which rounds that correct places end.
     pub fn tolerance(&self) -> f64 {
         if self.solver.pressure == Pressure::Pbf { self.solver.tolerance.min(LOOSE) } else { self.solver.tolerance }

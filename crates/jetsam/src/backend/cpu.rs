@@ -3,6 +3,7 @@
 //! Work is cut into chunks of fixed size whose results do not depend on who computes them, and sums over chunks
 //! are made in their order: the same bits for any number of threads.
 
+mod coarse;
 mod contacts;
 mod implicit;
 mod parts;

@@ -317,6 +317,17 @@ impl Cells {
         self.start[self.window.index(c) + 1] as usize
     }
 
+    /// Where cell `c` begins in the sorted order.
+    #[inline(always)]
+    pub fn start(&self, c: [i32; 3]) -> usize {
+        self.start[self.window.index(c)] as usize
+    }
+
+    /// The cells that are occupied.
+    pub fn window(&self) -> Window {
+        self.window
+    }
+
     /// Whether there may be particles in the 27 cells around `c`: exact where the cells have been mapped.
     #[inline(always)]
     pub fn are_near(&self, grid: &Grid, c: [i32; 3]) -> bool {

@@ -123,6 +123,8 @@ pub struct Shares<'a> {
     pub hold: &'a mut [f32],
     /// Those that pushed in the round before.
     pub before: &'a mut [f32],
+    /// Receives what the shares that pushed have left, in compression; of particles without pressure only the excess.
+    pub left: &'a mut [f32],
 }
 
 /// What a round says of a chunk.
@@ -140,7 +142,7 @@ pub struct Said {
 /// holds the shares that pushed and receives those to push with next, `before` those of the round before and those that pushed.
 #[inline(always)]
 pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rate: &[f32], shares: Shares) -> Said {
-    let Shares { share, hold, before } = shares;
+    let Shares { share, hold, before, left: rest } = shares;
     let (kept, stride) = (implicit::carried(round.number), implicit::stride(round.number));
     let mut sums = [[0.0; LANES]; 3];
     for (s, nodes) in nodes.iter().enumerate() {
@@ -167,7 +169,7 @@ pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rat
             sums[1][l] += f64::from(against[l]);
             sums[2][l] += f64::from(signed[l]);
         }
-        for (to, from) in [(&mut *before, own), (&mut *share, now), (&mut *hold, held)] {
+        for (to, from) in [(&mut *before, own), (&mut *share, now), (&mut *hold, held), (&mut *rest, signed)] {
             store(f32x16::load_array(simd, from), to, at);
         }
     }

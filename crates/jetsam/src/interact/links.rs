@@ -193,6 +193,8 @@ pub struct Nodes {
     pub all: [[Lanes; 3]; 2],
     /// `sum rho_i (g - a_b) . d_ib e_ib` over particles of bodies and walls (Pa/m).
     pub pull: [Lanes; 3],
+    /// How much of a gradient the sum over fluids finds: 1 amid them, about a half at their surface.
+    pub spread: Lanes,
     /// `1 / rho_0` (m^3/kg).
     pub inverse_rho: Lanes,
     /// How fast the particle's density is driven down by its own share (1/(Pa s^2)), with either.
@@ -227,6 +229,7 @@ struct Sums {
     solid: [Lanes; 3],
     pull: [Lanes; 3],
     pairs: Lanes,
+    spread: Lanes,
     weight: Lanes,
 }
 
@@ -276,6 +279,9 @@ pub fn chunk<S: Simd, const DENSITY: bool>(
             nodes.response[TWICE][l] = implicit::response(twice_sq, inverse_rho, pairs);
         }
         nodes.pull = sums.pull;
+        for l in 0..LANES {
+            nodes.spread[l] = sums.spread[l] / model.dimensions as f32;
+        }
         if DENSITY {
             for (l, k) in members.enumerate() {
                 density[k] = model.factors.w * (sums.weight[l] + at_center * own.at.volume[l]);
@@ -337,6 +343,7 @@ fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
         if FLUID {
             for l in 0..LANES {
                 sums.pairs[l] += answer[l] * (e[0][l] * e[0][l] + e[1][l] * e[1][l] + e[2][l] * e[2][l]);
+                sums.spread[l] += d[0][l] * e[0][l] + d[1][l] * e[1][l] + d[2][l] * e[2][l];
             }
         }
         if !FLUID {

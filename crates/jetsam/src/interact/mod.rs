@@ -4,6 +4,7 @@
 
 pub mod boundary;
 pub mod cells;
+pub mod coarse;
 pub mod contacts;
 pub mod density;
 pub mod forces;

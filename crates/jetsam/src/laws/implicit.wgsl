@@ -52,3 +52,18 @@ fn hold(share: f32, limit: f32) -> f32 {
 fn share_at_boundary(share: f32, hold: f32, pull_dot_d: f32) -> f32 {
   return 2.0 * share + hold * pull_dot_d;
 }
+
+// The coarse level: shares at nodes, linear on each axis between them. Where x is between two nodes: 0 at the first, 1 at the second.
+fn part_way(x: f32, first: f32, per_metre: f32) -> f32 {
+  return clamp((x - first) * per_metre, 0.0, 1.0);
+}
+
+// What shares with the value s and the gradient g at a particle push it by, sum_i s_i e_ki + s (all) = s b + K g: b by shares that are 1
+// everywhere, as accelerations push = -b / rho; K = sum d e in the mean of all directions. Factors of s and of g; their squares are in
+// compression by Pa^2.
+fn by_value(push: f32, inverse_rho: f32, scale: f32) -> f32 {
+  return -push * sqrt(scale / inverse_rho);
+}
+fn by_slope(spread: f32, inverse_rho: f32, scale: f32) -> f32 {
+  return spread * sqrt(scale * inverse_rho);
+}

@@ -97,7 +97,7 @@ pub struct Expect {
     /// Where the expected value comes from: a paper, a formula.
     pub source: String,
     /// Whether the verdict counts; if not, the number is only reported.
-    #[serde(default = "yes")]
+    #[serde(default = "super::yes")]
     pub gate: bool,
     /// Only of these variants; of every run when absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -112,10 +112,6 @@ pub struct Expect {
 
 fn first_two() -> [f64; 2] {
     [1.0, 2.0]
-}
-
-fn yes() -> bool {
-    true
 }
 
 /// One number made of those of several variants.

@@ -162,6 +162,10 @@ pub struct Solver {
     /// The same for the compression that velocities bring in a step (E9, DFSPH).
     #[serde(default = "d::divergence_tolerance")]
     pub divergence_tolerance: f64,
+    /// Whether implicit pressure finds its smooth part on a coarse lattice between rounds (E9). Without, rounds bring it through deep water bit by
+    /// bit: to compare by, and on a GPU, which makes rounds alone.
+    #[serde(default = "yes")]
+    pub coarse: bool,
     /// Most iterations of implicit pressure in a step, of each kind (E9): a budget for real time. On one below 24 fluids yield under PBF:
     /// 4 leave about 1.3 % of compression, 8 about 0.4 %.
     #[serde(default = "d::iterations")]
@@ -260,6 +264,10 @@ pub struct Solver {
     /// at the end, in two periods of the slowest wave: eight times as long as it takes through the domain.
     #[serde(default = "d::settle")]
     pub settle: f64,
+}
+
+fn yes() -> bool {
+    true
 }
 
 impl Default for Solver {

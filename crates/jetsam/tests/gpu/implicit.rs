@@ -29,7 +29,7 @@ const IMPLICIT: [&str; 2] = ["dfsph", "pbf"];
 /// A scene with a solver that makes so many rounds, no more and no less.
 fn with_rounds(text: &str, solver: &str, rounds: u32) -> String {
     format!(
-        "{text}\n[solver]\npressure = \"{solver}\"\niterations = {rounds}\ntolerance = 1e-6\ndivergence_tolerance = 1e-6\n"
+        "{text}\n[solver]\npressure = \"{solver}\"\niterations = {rounds}\ntolerance = 1e-6\ndivergence_tolerance = 1e-6\ncoarse = false\n"
     )
 }
 

@@ -3,6 +3,7 @@
 //! Shares push fluids and bodies; a body's velocity follows within the round, so that light bodies and deep water agree
 //! about where they go. What fluids gain bodies and walls lose, pair by pair.
 
+use super::coarse::Level;
 use super::{CHUNK, Cpu, GONE};
 use crate::integrate::{Advance, bodies};
 use crate::interact::cells::DRAINED;
@@ -25,14 +26,21 @@ const TURNS: u32 = 3;
 /// An error so many times the least so far says that rounds do not converge.
 const WORSE: f64 = 10.0;
 
+/// Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last.
+const EVERY: u32 = 2;
+const WORTH: f64 = 0.8;
+
 /// What the solvers keep between rounds, and from one step to the next.
 #[derive(Default)]
 pub(super) struct Implicit {
-    links: Vec<Links>,
-    nodes: Vec<Nodes>,
-    share: Vec<f32>,
-    hold: Vec<f32>,
-    before: Vec<f32>,
+    pub(super) links: Vec<Links>,
+    pub(super) nodes: Vec<Nodes>,
+    pub(super) share: Vec<f32>,
+    pub(super) hold: Vec<f32>,
+    pub(super) before: Vec<f32>,
+    /// What the shares of a round have left (compression), for the coarse level.
+    pub(super) left: Vec<f32>,
+    pub(super) coarse: Level,
     /// Shares (Pa) with which DFSPH corrected places at the last step, in the order of today.
     places: Vec<f32>,
     /// Accelerations, or velocities (m/s), of fluids and rigid bodies' particles.
@@ -41,7 +49,7 @@ pub(super) struct Implicit {
     rate: Vec<f32>,
     said: Vec<Said>,
     /// Forces on bodies' particles (N), from the first rigid one on.
-    force: Vec<[f32; 3]>,
+    pub(super) force: Vec<[f32; 3]>,
     /// Force (N) and torque (N m) on each body by the shares of a round.
     thrust: Vec<[DVec3; 2]>,
     /// Force and torque by fluids on each body for which this step of bodies stands.
@@ -73,7 +81,7 @@ impl Implicit {
 
 /// What one solve is about.
 #[derive(Clone, Copy, PartialEq)]
-enum Aim {
+pub(super) enum Aim {
     /// Velocities that do not compress.
     Velocities,
     /// Places where nothing is compressed when the drift is over.
@@ -91,7 +99,7 @@ impl Aim {
 
 impl Cpu {
     /// Whether fluids move bodies now: not while a scene settles.
-    fn movable(body: &Body, advance: Advance) -> bool {
+    pub(super) fn movable(body: &Body, advance: Advance) -> bool {
         advance.drag == 0.0 && !body.is_static() && !body.asleep && !body.one_way
     }
 
@@ -116,8 +124,7 @@ impl Cpu {
     /// Accelerations by the present shares, of fluids and of the bodies that answer.
     fn accelerate(&mut self, model: &Model, advance: Advance, gravity: DVec3, aim: Aim) {
         self.push_fluids();
-        let near = self.neighbours[Kind::Rigid as usize].iter().any(|c| c.found);
-        if aim != Aim::Places && near && links::bodies(model).contains(&Kind::Rigid) {
+        if self.answers(model, aim) {
             self.press(model, Kind::Rigid, gravity);
             self.push_bodies(advance);
         } else {
@@ -125,7 +132,14 @@ impl Cpu {
         }
     }
 
-    fn push_fluids(&mut self) {
+    /// Whether there are bodies that answer in rounds.
+    pub(super) fn answers(&self, model: &Model, aim: Aim) -> bool {
+        let near = self.neighbours[Kind::Rigid as usize].iter().any(|c| c.found);
+        aim != Aim::Places && near && links::bodies(model).contains(&Kind::Rigid)
+    }
+
+    /// Accelerations of fluids by the shares.
+    pub(super) fn push_fluids(&mut self) {
         let Implicit { links, nodes, share, hold, flow, .. } = &mut self.implicit;
         let (share, hold, level) = (&share[..], &hold[..], self.level);
         let fluids = flow[..hold.len()].par_chunks_mut(CHUNK);
@@ -139,7 +153,7 @@ impl Cpu {
     }
 
     /// Force and torque of the shares on every body of a kind.
-    fn press(&mut self, model: &Model, kind: Kind, gravity: DVec3) {
+    pub(super) fn press(&mut self, model: &Model, kind: Kind, gravity: DVec3) {
         let State { particles: p, bodies: b, .. } = &self.state;
         let Implicit { share, hold, force, thrust, .. } = &mut self.implicit;
         let (first, segment, level) = (p.first[Kind::Rigid as usize], p.segment(kind), self.level);
@@ -214,18 +228,19 @@ impl Cpu {
     /// One round: the rates of what `flow` holds, and all shares relaxed by them.
     fn relax(&mut self, round: Round) -> Said {
         let level = self.level;
-        let Implicit { links, nodes, flow, share, hold, before, error, rate, said, .. } = &mut self.implicit;
+        let Implicit { links, nodes, flow, share, hold, before, left, error, rate, said, .. } = &mut self.implicit;
         said.resize(links.len(), Said::default());
         let flow = &flow[..];
-        let shares = share.par_chunks_mut(CHUNK).zip(hold.par_chunks_mut(CHUNK)).zip(before.par_chunks_mut(CHUNK));
+        let shares = share.par_chunks_mut(CHUNK).zip(hold.par_chunks_mut(CHUNK));
+        let shares = shares.zip(before.par_chunks_mut(CHUNK).zip(left.par_chunks_mut(CHUNK)));
         let read = nodes.par_chunks(CHUNK / LANES).zip(error.par_chunks(CHUNK)).zip(links.par_iter());
         let all = said.par_iter_mut().zip(rate.par_chunks_mut(CHUNK)).zip(shares.zip(read)).enumerate();
-        all.for_each(|(c, ((said, rate), (((share, hold), before), ((nodes, error), links))))| {
+        all.for_each(|(c, ((said, rate), (((share, hold), (before, left)), ((nodes, error), links))))| {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => {
                     implicit::rates(simd, table, links, nodes, round.walls, flow, c * CHUNK, rate);
-                    *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, before });
+                    *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, before, left });
                 });
             });
         });
@@ -246,6 +261,7 @@ impl Cpu {
         s.share[n..].fill(0.0); // links name bodies' particles too
         s.hold.resize(n, 0.0);
         s.before.resize(n, 0.0);
+        s.left.resize(n, 0.0);
         s.error.resize(n, 0.0);
         s.rate.resize(n, 0.0);
         s.flow.resize(total, [0.0; 4]);
@@ -342,7 +358,7 @@ impl Cpu {
         let compliance = if aim == Aim::Both { model.compliance() as f32 } else { 0.0 };
         let omega = model.factors.relaxation;
         let mut round = Round { walls: aim.walls(), omega, scale, compliance, number: 0.0, limit };
-        let (mut said, mut best) = (Solve::default(), f64::INFINITY);
+        let (mut said, mut best, mut smoothed) = (Solve::default(), f64::INFINITY, f64::INFINITY);
         let small = loop {
             self.accelerate(model, advance, gravity, aim);
             let Said { error, against, bias } = self.relax(round);
@@ -357,6 +373,11 @@ impl Cpu {
             let small = said.residual <= tolerance && bias.abs() <= n as f64 * unheld;
             if small || f64::from(said.iterations) >= most {
                 break small;
+            }
+            let due = said.iterations % EVERY == 1 && said.residual < WORTH * smoothed;
+            if due && aim != Aim::Places && model.coarse() {
+                (smoothed, round.number) = (said.residual, 0.0);
+                self.smooth(model, advance, round, aim);
             }
         };
         let Implicit { share, hold, before, error, rate, .. } = &mut self.implicit;
