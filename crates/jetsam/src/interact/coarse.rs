@@ -467,3 +467,61 @@ impl Mover {
 fn dot(a: &[f32; 6], b: &[f32; 6]) -> f32 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Wall;
+
+    /// In a periodic box full of fluid what answers to a wave is `scale / rho k^2` times it.
+    #[test]
+    fn a_wave_is_found() {
+        let (n, dx, scale, inverse_rho) = (32, 0.1, 1e-4, 1e-3);
+        let length = f64::from(n) * dx;
+        let grid = Grid::new(DVec3::ZERO, DVec3::splat(length), [Wall::Periodic; 3], 3, 2.0 * dx, 0.0);
+        let at = |i: i32| ((f64::from(i) + 0.5) * dx) as f32;
+        let all = (0..n * n * n).map(|k| [at(k % n), at(k / n % n), at(k / n / n)]);
+        let mut records: Vec<Record> = all.map(|x| Record { x, ..Record::default() }).collect();
+        let mut cells = Cells::default();
+        assert_eq!(cells.sort(&grid, &records, None), records.len());
+        let order = cells.order.iter().map(|o| o.load(std::sync::atomic::Ordering::Relaxed) as usize);
+        records = order.map(|o| records[o]).collect();
+        let node = Nodes { spread: [1.0; LANES], inverse_rho: [inverse_rho; LANES], ..Nodes::default() };
+        let nodes = vec![node; records.len() / LANES];
+        let (active, push) = (vec![1.0; records.len()], vec![[0.0; 4]; records.len()]);
+        let (cells, records, nodes) = (&cells, &records[..], &nodes[..]);
+        let input = Input { grid: &grid, cells, records, nodes, active: &active, push: &push, scale, compliance: 0.0 };
+        let (level, mut coarse) = (Level::new(), Coarse::default());
+        coarse.assemble(level, input);
+        for axis in 0..3 {
+            let k = std::f64::consts::TAU / length;
+            let wave: Vec<f32> = records.iter().map(|r| (k * f64::from(r.x[axis])).sin() as f32).collect();
+            coarse.solve(level, cells, records, &wave);
+            let mut found = vec![0.0; records.len()];
+            dispatch!(level, simd => coarse.interpolate(simd, records, &mut found));
+            let answer = scale * inverse_rho * (k * k) as f32;
+            for (found, wave) in found.iter().zip(&wave) {
+                assert!((found * answer - wave).abs() < 0.1, "axis {axis}: {} for {wave}", found * answer);
+            }
+        }
+    }
+
+    /// A body that hangs between nodes and weighs nothing but what it has: shares of 1 all around push it with the sum of what its particles
+    /// feel, and what it answers is that by its mass.
+    #[test]
+    fn a_body_answers_by_its_mass_and_inertia() {
+        let felt = [([0.3; 3], DVec3::X, DVec3::new(0.0, 0.0, 2.0)), ([0.9; 3], -DVec3::X, DVec3::new(0.0, 0.0, 3.0))];
+        let axis = Axis { first: 0, cells: 4, elements: 2, nodes: 3, origin: 0.0, inverse: 2.0 };
+        let mut coarse = Coarse { axis: [axis; 3], ..Coarse::default() };
+        let element = |k| Element { corner: corners(&coarse.axis, place(&coarse.axis, k)), ..Element::default() };
+        coarse.element = (0..8).map(element).collect();
+        (coarse.diagonal, coarse.found) = (vec![0.0; 27], vec![u32::MAX; 27]);
+        (coarse.way, coarse.answer) = (vec![1.0; 27], vec![0.0; 27]);
+        let (inverse_mass, inverse_inertia) = (0.5, DMat3::from_diagonal(DVec3::new(1.0, 0.25, 1.0)));
+        coarse.answer(Felt { inverse_mass, inverse_inertia, factor: 10.0, particles: &mut felt.into_iter() });
+        dispatch!(Level::new(), simd => coarse.apply(simd, 0.0));
+        // F = 5 N, torque y = -2 + 3 = 1 N m: F^2 / M + T^2 / I
+        let energy: f32 = coarse.answer.iter().sum::<f32>() - STIFFNESS * coarse.diagonal.iter().sum::<f32>();
+        assert!((energy - 10.0 * (0.5 * 25.0 + 0.25 * 1.0)).abs() < 1e-3, "{energy}");
+    }
+}

@@ -1,7 +1,7 @@
 //! What implicit solvers (E9) know of the neighbourhood of each fluid particle while they iterate.
 //!
 //! In: transposed neighbours, records. Out: [`Links`], the vectors `e_ij = V_j grad_i W_ij` to fluids and particles of bodies; a
-//! [`Nodes`] for sixteen particles, with the sums of these vectors; for PBF, whose particles move while it iterates, densities anew.
+//! [`Nodes`] for sixteen particles, with the sums of these vectors; for PBF, whose particles move while it iterates, densities anew ([`densities`]).
 //! Walls do not answer: they are in the sums alone. Called by the stages `divergence` and `pressure`.
 //!
 //! Rounds wait for the links they read, and for the values of neighbours. So a link takes 8 bytes: its vector in whole numbers, and
@@ -230,25 +230,16 @@ struct Sums {
     pull: [Lanes; 3],
     pairs: Lanes,
     spread: Lanes,
-    weight: Lanes,
 }
 
-/// Links and nodes of a chunk of fluid particles. With `DENSITY` their densities too.
+/// Links and nodes of a chunk of fluid particles.
 #[inline(always)]
-pub fn chunk<S: Simd, const DENSITY: bool>(
-    simd: S,
-    input: Input,
-    slices: &Slices,
-    links: &mut Links,
-    nodes: &mut [Nodes],
-    density: &mut [f32],
-) {
+pub fn chunk<S: Simd>(simd: S, input: Input, slices: &Slices, links: &mut Links, nodes: &mut [Nodes]) {
     let model = input.model;
     let floor = 1e-4 / (model.spacing * model.spacing) as f32;
-    let at_center = model.kernel.density().w(0.0);
     links.clear(slices, model.longest_link());
     links.movers = if model.solver.pressure == Pressure::Dfsph { 2.0 } else { 1.0 };
-    for ((s, members), nodes) in slices.each().zip(nodes) {
+    for ((s, _), nodes) in slices.each().zip(nodes) {
         let own = Own::slice(simd, input.records, slices, s);
         let mut rho = [model.fluids[0].density; LANES];
         if model.fluids.len() > 1 {
@@ -257,10 +248,10 @@ pub fn chunk<S: Simd, const DENSITY: bool>(
             }
         }
         let mut sums = Sums::default();
-        run::<S, DENSITY, true>(simd, &input, slices, s, &own, &rho, Kind::Fluid, links, &mut sums);
+        run::<S, true>(simd, &input, slices, s, &own, &rho, Kind::Fluid, links, &mut sums);
         for &kind in bodies(model) {
             if slices.has(s, kind) {
-                run::<S, DENSITY, false>(simd, &input, slices, s, &own, &rho, kind, links, &mut sums);
+                run::<S, false>(simd, &input, slices, s, &own, &rho, kind, links, &mut sums);
             }
         }
         links.ends.push(links.used as u32);
@@ -282,10 +273,37 @@ pub fn chunk<S: Simd, const DENSITY: bool>(
         for l in 0..LANES {
             nodes.spread[l] = sums.spread[l] / model.dimensions as f32;
         }
-        if DENSITY {
-            for (l, k) in members.enumerate() {
-                density[k] = model.factors.w * (sums.weight[l] + at_center * own.at.volume[l]);
+    }
+}
+
+/// Densities (E1) of a chunk of fluid particles where they are now, amid the neighbours they had.
+#[inline(always)]
+pub fn densities<S: Simd>(simd: S, model: &Model, records: &[Record], slices: &Slices, density: &mut [f32]) {
+    let (kernel, inverse) = (model.kernel.density(), model.inverse_support());
+    let at_center = kernel.w(0.0);
+    for (s, members) in slices.each() {
+        let own = Own::slice(simd, records, slices, s);
+        let mut sum = [0.0; LANES];
+        for l in 0..LANES {
+            sum[l] = at_center * own.at.volume[l];
+        }
+        for &kind in [Kind::Fluid].iter().chain(bodies(model)) {
+            if kind != Kind::Fluid && !slices.has(s, kind) {
+                continue;
             }
+            for near in slices.run(records, s, kind) {
+                let other = gather(simd, near);
+                let (_, r_sq) = wrap_lanes(simd, model, &own.at.x, &other.x);
+                let w = weights(kernel, inverse, &r_sq);
+                for l in 0..LANES {
+                    // the particle itself, and what fills a slot, has its part already
+                    let weight = if near.index[l] == own.i[l] { 0.0 } else { w[l] };
+                    sum[l] += other.volume[l] * weight;
+                }
+            }
+        }
+        for (l, k) in members.enumerate() {
+            density[k] = model.factors.w * sum[l];
         }
     }
 }
@@ -301,7 +319,7 @@ pub fn bodies(model: &Model) -> &'static [Kind] {
 /// Links to the neighbours of one kind, and their sums.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)] // one caller
-fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
+fn run<S: Simd, const FLUID: bool>(
     simd: S,
     input: &Input,
     slices: &Slices,
@@ -356,14 +374,6 @@ fn run<S: Simd, const DENSITY: bool, const FLUID: bool>(
         }
         if kind == Kind::Rigid {
             scripted(input, near, &d, &e, rho, sums);
-        }
-        if DENSITY {
-            let w = weights(model.kernel.density(), inverse, &r_sq);
-            for l in 0..LANES {
-                // the particle itself, and what fills a slot, is left to the end
-                let weight = if near.index[l] == own.i[l] { 0.0 } else { w[l] };
-                sums.weight[l] += other.volume[l] * weight;
-            }
         }
     }
 }

@@ -23,12 +23,16 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// How often PBF finds the vectors to neighbours anew in a step.
 const TURNS: u32 = 3;
+/// The part of the tolerance at which its rounds end before.
+const FIRST: f64 = 0.7;
 /// An error so many times the least so far says that rounds do not converge.
 const WORSE: f64 = 10.0;
 
-/// Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last.
+/// Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last, and
+/// if so much of it is of one sign: errors that cancel are for rounds.
 const EVERY: u32 = 2;
 const WORTH: f64 = 0.8;
+const SMOOTH: f64 = 0.05;
 
 /// What the solvers keep between rounds, and from one step to the next.
 #[derive(Default)]
@@ -103,9 +107,9 @@ impl Cpu {
         advance.drag == 0.0 && !body.is_static() && !body.asleep && !body.one_way
     }
 
-    /// Links and nodes where particles are now; for PBF densities too.
-    fn link<const DENSITY: bool>(&mut self, model: &Model, gravity: DVec3) {
-        let State { particles: p, bodies: b, .. } = &mut self.state;
+    /// Links and nodes where particles are now.
+    fn link(&mut self, model: &Model, gravity: DVec3) {
+        let State { particles: p, bodies: b, .. } = &self.state;
         let n = p.count[Kind::Fluid as usize];
         let Implicit { links, nodes, .. } = &mut self.implicit;
         links.resize_with(n.div_ceil(CHUNK), Links::default);
@@ -114,11 +118,21 @@ impl Cpu {
         let input = links::Input { model, records: &p.record, owner: &p.owner, bodies: &b.body, gravity };
         let level = self.level;
         let chunks = links.par_iter_mut().zip(nodes.par_chunks_mut(CHUNK / LANES)).zip(&self.slices);
-        chunks.zip(p.density[..n].par_chunks_mut(CHUNK)).for_each(|(((links, nodes), slices), density)| {
-            dispatch!(level, simd => {
-                links::chunk::<_, DENSITY>(simd, input, slices, links, nodes, density);
-            });
+        chunks.for_each(|((links, nodes), slices)| {
+            dispatch!(level, simd => links::chunk(simd, input, slices, links, nodes));
         });
+    }
+
+    /// Mean of what densities are above that of rest where particles have been moved to.
+    fn compressed(&mut self, model: &Model) -> f64 {
+        let (p, level) = (&mut self.state.particles, self.level);
+        let n = p.count[Kind::Fluid as usize];
+        let (records, density) = (&p.record[..], &mut p.density[..n]);
+        let chunks = density.par_chunks_mut(CHUNK).zip(&self.slices).map(|(density, slices)| {
+            dispatch!(level, simd => links::densities(simd, model, records, slices, density));
+            density.iter().map(|d| f64::from((d - 1.0).max(0.0))).sum()
+        });
+        chunks.collect::<Vec<f64>>().iter().sum::<f64>() / n as f64
     }
 
     /// Accelerations by the present shares, of fluids and of the bodies that answer.
@@ -285,7 +299,7 @@ impl Cpu {
         let warm: Vec<f32> = p.record[p.segment(Kind::Fluid)].par_iter().map(|r| r.share).collect();
         self.prepare(model, |i| warm[i]);
         let gravity = model.gravity_at(advance.end());
-        self.link::<false>(model, gravity);
+        self.link(model, gravity);
         // what all but fluids' pressures and contacts make of bodies
         self.flow_of_bodies(advance);
         self.implicit.divergence = self.solve(model, advance, Aim::Velocities, model.budget());
@@ -350,7 +364,9 @@ impl Cpu {
         self.errors(dt, aim);
         let tolerance = match aim {
             Aim::Velocities => model.solver.divergence_tolerance,
-            Aim::Places | Aim::Both => model.tolerance(),
+            Aim::Places => model.tolerance(),
+            // vectors are not the same when particles have moved: what they find then is to be small too
+            Aim::Both => FIRST * model.tolerance(),
         };
         let unheld = if aim == Aim::Velocities { model.unheld() * advance.dt.powi(2) } else { f64::INFINITY };
         let scale = dt * dt;
@@ -374,8 +390,8 @@ impl Cpu {
             if small || f64::from(said.iterations) >= most {
                 break small;
             }
-            let due = said.iterations % EVERY == 1 && said.residual < WORTH * smoothed;
-            if due && aim != Aim::Places && model.coarse() {
+            let worth = said.residual < WORTH * smoothed && bias.abs() > SMOOTH * error;
+            if worth && said.iterations % EVERY == 1 && aim != Aim::Places && model.coarse() {
                 (smoothed, round.number) = (said.residual, 0.0);
                 self.smooth(model, advance, round, aim);
             }
@@ -442,19 +458,15 @@ impl Cpu {
             if n == 0 || advance.dt == 0.0 {
                 break;
             }
-            if turn == 0 {
-                self.link::<false>(model, gravity);
-            } else {
-                self.link::<true>(model, gravity);
-                let density = &self.state.particles.density[..n];
-                let over = density.par_chunks(CHUNK).map(|d| d.iter().map(|d| f64::from((d - 1.0).max(0.0))).sum());
-                said.residual = over.collect::<Vec<f64>>().iter().sum::<f64>() / n as f64;
+            if turn > 0 {
+                said.residual = self.compressed(model);
                 let budget = f64::from(said.iterations) >= model.budget();
                 if said.residual <= model.tolerance() || budget || turn == TURNS {
                     break;
                 }
                 self.prepare(model, |_| 0.0);
             }
+            self.link(model, gravity);
             let left = model.budget() - f64::from(said.iterations);
             said.iterations += self.solve(model, advance, Aim::Both, left).iterations;
             if links::bodies(model).contains(&Kind::Static) {
