@@ -29,7 +29,7 @@ const FIRST: f64 = 0.7;
 const WORSE: f64 = 10.0;
 
 /// Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last, and
-/// if so much of it is of one sign: errors that cancel are for rounds.
+/// if a weight is not held yet or, of places, if so much of the error is of one sign: errors that cancel are for rounds.
 const EVERY: u32 = 2;
 const WORTH: f64 = 0.8;
 const SMOOTH: f64 = 0.05;
@@ -390,7 +390,8 @@ impl Cpu {
             if small || f64::from(said.iterations) >= most {
                 break small;
             }
-            let worth = said.residual < WORTH * smoothed && bias.abs() > SMOOTH * error;
+            let smooth = if unheld.is_finite() { n as f64 * unheld } else { SMOOTH * error };
+            let worth = said.residual < WORTH * smoothed && bias.abs() > smooth;
             if worth && said.iterations % EVERY == 1 && aim != Aim::Places && model.coarse() {
                 (smoothed, round.number) = (said.residual, 0.0);
                 self.smooth(model, advance, round, aim);
