@@ -23,8 +23,9 @@ const CORNERS: usize = 8;
 type Corners = [f32; CORNERS];
 /// Elements summed as one job.
 const JOB: usize = 8;
-/// Most rounds of conjugate gradients, and the part of the residual's square they end at.
+/// Most rounds of conjugate gradients.
 pub const ROUNDS: u32 = 40;
+/// The part of the residual's square they end at.
 pub const ENOUGH: f64 = 1e-3;
 /// Part of the diagonal by which nodes answer more than they do, and of the largest: what a few particles answer is not trusted.
 pub const STIFFNESS: f32 = 1e-3;

@@ -2,9 +2,10 @@
 // every other round and do nothing unless `judge` has said that the level is due. No sum depends on who comes first: particles are summed in
 // their order, nodes gather from elements and bodies, and what bodies' particles do to nodes is added in whole numbers.
 
-// Numbers of an element: a triangle of its matrix, what is left at its corners. Corner `c` is at the end `c >> a & 1` of axis `a`.
+// Numbers of an element: a triangle of its matrix, then what is left at its corners. Corner `c` is at the end `c >> a & 1` of axis `a`.
 const CORNERS: u32 = 8u;
 const TRIANGLE: u32 = 36u;
+const NUMBERS: u32 = 44u;
 // Numbers of a node: its row of the matrix (nodes around it, the lowest first); vectors of nodes.
 const ROW: i32 = 27;
 const SHARE: u32 = 0u;
@@ -85,6 +86,42 @@ fn coarse_window(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n
   }
 }
 
+// Rows of cells on x in an element, one behind the other: where their particles stand, and how many there are up to the end of each.
+struct Rows { begin: array<u32, SIDE * SIDE>, end: array<u32, SIDE * SIDE> }
+fn rows_of(t: Lattice, at: vec3<i32>) -> Rows {
+  var these = Rows();
+  let low = t.first + SIDE * at;
+  let high = t.first + min(SIDE * at + SIDE, t.cells);
+  var total = 0u;
+  for (var r = 0; r < SIDE * SIDE; r += 1) {
+    let y = low.y + r % SIDE;
+    let z = low.z + r / SIDE;
+    if (y < high.y && z < high.z) {
+      let row = (u32(z) * m.cells.y + u32(y)) * m.cells.x;
+      these.begin[r] = starts[row + u32(low.x)];
+      total += starts[row + u32(high.x)] - these.begin[r];
+    }
+    these.end[r] = total;
+  }
+  return these;
+}
+// Elements that hold particles. Which comes first is chance, but nothing depends on it.
+@compute @workgroup_size(256)
+fn coarse_occupied(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
+  let k = number(g, n, l, 256u);
+  if (clock.running == 0u || live_fluid() == 0u) { return; }
+  let t = lattice_now();
+  let count = volume_of(t.elements);
+  if (k >= count) { return; }
+  let these = rows_of(t, place_in(k, t.elements));
+  var seat = GONE;
+  if (these.end[SIDE * SIDE - 1] > 0u) {
+    seat = atomicAdd(&solve.occupied, 1u);
+    seats[count + seat] = k;
+  }
+  seats[k] = seat;
+}
+
 // 1 for a particle whose share takes part, else 0.
 fn takes_part(i: u32) -> f32 { return select(0.0, 1.0, work[i].x > 0.0 || remains[i] > 0.0); }
 
@@ -119,29 +156,15 @@ var<workgroup> laid: array<vec4<f32>, 512>;     // by particle and corner: what 
 var<workgroup> softs: array<vec2<f32>, 64>;     // how far the particle yields, what it has left
 @compute @workgroup_size(64)
 fn coarse_elements(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
-  let k = g.y * n.x + g.x;
+  if (l == 0u) { idle = select(0u, atomicLoad(&solve.occupied), coarse_due()); }
+  let occupied = workgroupUniformLoad(&idle);
+  for (var seat = g.y * n.x + g.x; seat < occupied; seat += n.x * n.y) { sum_element(seat, l); }
+}
+fn sum_element(seat: u32, l: u32) {
   let t = lattice_now();
-  let count = volume_of(t.elements);
-  let at = place_in(k, t.elements);
-  // rows of cells on x, one behind the other
-  var begin = array<u32, 4>();
-  var end = array<u32, 4>();
-  var total = 0u;
-  if (coarse_due() && k < count) {
-    let low = t.first + SIDE * at;
-    let high = t.first + min(SIDE * at + SIDE, t.cells);
-    for (var r = 0; r < SIDE * SIDE; r += 1) {
-      let y = low.y + r % SIDE;
-      let z = low.z + r / SIDE;
-      if (y < high.y && z < high.z) {
-        let row = (u32(z) * m.cells.y + u32(y)) * m.cells.x;
-        begin[r] = starts[row + u32(low.x)];
-        total += starts[row + u32(high.x)] - begin[r];
-      }
-      end[r] = total;
-    }
-  }
-  if (l == 0u) { idle = total; }
+  let at = place_in(seats[volume_of(t.elements) + seat], t.elements);
+  var these = rows_of(t, at);
+  if (l == 0u) { idle = these.end[SIDE * SIDE - 1]; }
   let all = workgroupUniformLoad(&idle);
   let e = ends_of(t, at);
   let scale = clock.dt * clock.dt;
@@ -151,29 +174,28 @@ fn coarse_elements(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups)
   while (a < CORNERS && b >= CORNERS - a) { b -= CORNERS - a; a += 1u; }
   b += a;
   var sum = 0.0;
-  for (var from_here = 0u; from_here < all; from_here += 64u) {
-    let p = from_here + l;
+  for (var done = 0u; done < all; done += 64u) {
+    let p = done + l;
     if (p < all) {
       var r = 0u;
-      while (p >= end[r]) { r += 1u; }
+      while (p >= these.end[r]) { r += 1u; }
       var behind = 0u;
-      if (r > 0u) { behind = end[r - 1u]; }
-      lay(begin[r] + p - behind, l, e, scale);
+      if (r > 0u) { behind = these.end[r - 1u]; }
+      lay(these.begin[r] + p - behind, l, e, scale);
     }
     workgroupBarrier();
-    let there = min(64u, all - from_here);
-    for (var q = 0u; q < there; q += 1u) {
+    for (var q = 0u; q < min(64u, all - done); q += 1u) {
       if (l < TRIANGLE) {
         let one = laid[CORNERS * q + a];
         let other = laid[CORNERS * q + b];
         sum += dot(one.xyz, other.xyz) + softs[q].x * (one.w * other.w);
-      } else if (l < TRIANGLE + CORNERS) {
+      } else if (l < NUMBERS) {
         sum += laid[CORNERS * q + l - TRIANGLE].w * softs[q].y;
       }
     }
     workgroupBarrier();
   }
-  if (coarse_due() && k < count && l < TRIANGLE + CORNERS) { elements[l * count + k] = sum; }
+  if (l < NUMBERS) { elements[NUMBERS * seat + l] = sum; }
 }
 fn lay(i: u32, l: u32, e: Ends, scale: f32) {
   let push = flow[i];
@@ -306,7 +328,6 @@ fn coarse_nodes(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   let t = lattice_now();
   let count = volume_of(t.nodes);
   if (i >= count) { return; }
-  let stride = volume_of(t.elements);
   let at = place_in(i, t.nodes);
   let ring = t.nodes == t.elements;
   var row = array<f32, 27>();
@@ -318,12 +339,14 @@ fn coarse_nodes(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
     var of_element = at - corner(c);
     of_element = select(of_element, (of_element + t.elements) % t.elements, ring);
     if (any(of_element < vec3<i32>(0)) || any(of_element >= t.elements)) { continue; }
-    let k = number_in(of_element, t.elements);
-    rest += elements[(TRIANGLE + c) * stride + k];
-    diagonal += elements[entry(c, c) * stride + k];
+    let seat = seats[number_in(of_element, t.elements)];
+    if (seat == GONE) { continue; }
+    let k = NUMBERS * seat;
+    rest += elements[k + TRIANGLE + c];
+    diagonal += elements[k + entry(c, c)];
     for (var d = 0u; d < CORNERS; d += 1u) {
       let way = corner(d) - corner(c) + 1;
-      row[(way.z * 3 + way.y) * 3 + way.x] += elements[entry(c, d) * stride + k];
+      row[(way.z * 3 + way.y) * 3 + way.x] += elements[k + entry(c, d)];
     }
   }
   for (var k = 0u; k < answering(); k += 1u) {
@@ -422,7 +445,9 @@ fn answer_of(i: u32, t: Lattice, count: u32, listed: u32) -> f32 {
   let y = vec3<i32>(before.y, at.y, after.y);
   let z = vec3<i32>(before.z, at.z, after.z);
   var sum = 0.0;
-  for (var k = 0; k < ROW; k += 1) {
+  // where nothing answers, the row is empty
+  let begin = select(0, ROW, lattice[DIAGONAL * count + i] == 0.0);
+  for (var k = begin; k < ROW; k += 1) {
     let other = number_in(vec3<i32>(x[k % 3], y[k / 3 % 3], z[k / 9]), t.nodes);
     sum += rows[u32(k) * count + i] * lattice[WAY * count + other];
   }

@@ -38,6 +38,7 @@ fn forget_window() {
     atomicStore(&solve.low[a], 2147483647);
     atomicStore(&solve.high[a], -1);
   }
+  atomicStore(&solve.occupied, 0u);
 }
 
 // A solve begins: of velocities, of places, of the turns of PBF.

@@ -139,6 +139,7 @@ struct Solve {
   smoothed: f32,           // residual at its last solve
   low: array<atomic<i32>, 3>,   // the cells that fluids occupy
   high: array<atomic<i32>, 3>,
+  occupied: atomic<u32>,   // elements that hold particles
 }
 // What implicit pressure does to a body, and what it got from outside in this step. thrust: by the shares of a round; push: the
 // accelerations by it; steady: by fluids, as it stands for all parts of a step; added: what is in the force besides what was summed.
@@ -218,11 +219,12 @@ struct Sums {
 @group(0) @binding(40) var<storage, read_write> squeezed: array<vec4<f32>>; // force of shares on bodies' particles (N), as touch
 @group(0) @binding(41) var<storage, read_write> joints: array<Joint>;
 @group(0) @binding(42) var<storage, read_write> remains: array<f32>;        // fluid: what shares have left (compression)
-@group(0) @binding(43) var<storage, read_write> elements: array<f32>;       // coarse level: number by number of all elements
+@group(0) @binding(43) var<storage, read_write> elements: array<f32>;       // coarse level: what particles sum, element by element of those that hold any
 @group(0) @binding(44) var<storage, read_write> rows: array<f32>;           // number by number of all nodes
 @group(0) @binding(45) var<storage, read_write> lattice: array<f32>;        // vector by vector of all nodes
 @group(0) @binding(46) var<storage, read_write> giving: array<Giving>;      // bodies that have rigid slots
 @group(0) @binding(47) var<storage, read_write> reach: array<atomic<i32>>;  // force and torque on each by shares on nodes, in whole numbers
+@group(0) @binding(48) var<storage, read_write> seats: array<u32>;          // by element: which it is of those, or GONE; then which those are
 
 // A flock: as flock::FlockConstants, and its clock. lead: place and velocity of its first agent.
 struct Rule {

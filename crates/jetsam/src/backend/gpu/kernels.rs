@@ -39,8 +39,10 @@ pub enum Over {
     Particles(u32),
     /// Births of a frame.
     Births(u32),
-    /// Elements of the coarse level of implicit pressure, one to a workgroup.
-    Elements,
+    /// Elements of the coarse level of implicit pressure.
+    Elements(u32),
+    /// Those that hold particles: workgroups take one after another.
+    Occupied,
     /// Its nodes.
     Nodes(u32),
     /// Bodies that have rigid slots, one to a workgroup.
@@ -86,7 +88,7 @@ const ROUNDS: &[(&str, Over)] = &[
     ROUND[5],
     ROUND[6],
     ("coarse_push", Over::Fluids(128)),
-    ("coarse_elements", Over::Elements),
+    ("coarse_elements", Over::Occupied),
     ("coarse_bodies", Over::EachMover),
     ("coarse_press", Over::Slots(128)),
     ("coarse_reach", Over::Slots(128)),
@@ -176,6 +178,7 @@ pub fn sections(stage: Stage, solver: Pressure) -> &'static [Section] {
                 &[
                     ("begin_velocities", One),
                     ("coarse_window", Cells(256)),
+                    ("coarse_occupied", Elements(256)),
                     ("links", Fluids(128)),
                     ("seat", Moving(128)),
                     ("flow_of_bodies", Slots(128)),
@@ -193,7 +196,7 @@ pub fn sections(stage: Stage, solver: Pressure) -> &'static [Section] {
             (Once, &[("close", One), ("finish", Fluids(128)), ("accelerate", Fluids(128))]),
         ],
         (Stage::Pressure, Pressure::Pbf) => &[
-            (Once, &[("begin_turns", One), ("coarse_window", Cells(256))]),
+            (Once, &[("begin_turns", One), ("coarse_window", Cells(256)), ("coarse_occupied", Elements(256))]),
             (Once, TURN),
             (Rounds(0), ROUNDS),
             (Once, TURNED),

@@ -327,8 +327,10 @@ pub struct Sizes {
     pub agents: u32,
     /// Most cells of agents, all flocks together.
     pub agent_cells: u32,
-    /// Most elements and nodes of the coarse level.
+    /// Most elements of the coarse level, of those that hold particles, and nodes.
     pub elements: u32,
+    /// See there.
+    pub occupied: u32,
     /// See there.
     pub nodes: u32,
 }
@@ -801,7 +803,9 @@ mod tests {
             joint_force
         );
         same!("Joint", Joint, anchor_a, anchor_b, axis_a, axis_b, across_a, across_b, turn, law, limits, who);
-        for (name, bytes) in [("Solve", SOLVE_BYTES), ("Swept", SWEPT_BYTES), ("Node", NODE_BYTES), ("Giving", GIVING_BYTES)] {
+        for (name, bytes) in
+            [("Solve", SOLVE_BYTES), ("Swept", SWEPT_BYTES), ("Node", NODE_BYTES), ("Giving", GIVING_BYTES)]
+        {
             assert_eq!(layout(&module, name).1 as usize, bytes, "{name}");
         }
         same!(

@@ -159,7 +159,12 @@ pub fn text(model: &Model) -> String {
         let _ = writeln!(text, "const {name}: u32 = {count}u;");
     }
     let rows = if flat { 3 } else { 9 };
-    let _ = writeln!(text, "const SPLIT: i32 = {split};\nconst RUNS: i32 = {};\nconst SIDE: i32 = {};", rows * split, coarse::SIDE);
+    let _ = writeln!(
+        text,
+        "const SPLIT: i32 = {split};\nconst RUNS: i32 = {};\nconst SIDE: i32 = {};",
+        rows * split,
+        coarse::SIDE
+    );
     let (w, g) = (shape(model.kernel.density()), shape(model.kernel.force()));
     let _ = writeln!(text, "fn density_w(s: f32) -> f32 {{ return {w}_w(s); }}");
     let _ = writeln!(text, "fn force_g(s: f32) -> f32 {{ return {g}_g(s); }}");

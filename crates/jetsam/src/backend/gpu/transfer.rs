@@ -84,13 +84,15 @@ impl Buffers {
         let movers = state.bodies.body.iter().filter(|b| b.slots.start < state.bodies.rigid_slots).count() as u32;
         let coarse = model.implicit() && model.coarse();
         let [elements, nodes] = if coarse { layout::lattice(model) } else { [0; 2] };
-        gpu.info.holds_all("elements of implicit pressure", elements, elements * (4 * ELEMENT) as u64)?;
+        let occupied = elements.min(u64::from(fluids));
+        gpu.info.holds_all("elements of implicit pressure", occupied, occupied * (4 * ELEMENT) as u64)?;
         gpu.info.holds_all("nodes of implicit pressure", nodes, nodes * (4 * ROW) as u64)?;
         let reaches = if coarse { layout::reaches(model, state, movers) } else { vec![0] };
         let reached = reaches[reaches.len() - 1];
         gpu.info.holds_all("nodes that bodies reach", reached, reached * (4 * FELT) as u64)?;
         let sizes = Sizes {
             elements: elements as u32,
+            occupied: occupied as u32,
             nodes: nodes as u32,
             fluids,
             rigid,
@@ -156,11 +158,12 @@ impl Buffers {
             make("forces of shares", rounds(slots), 16)?,
             make("joints", model.joints.len(), size_of::<Joint>())?,
             make("what shares have left", if coarse { fluids as usize } else { 0 }, 4)?,
-            make("elements of implicit pressure", sizes.elements as usize * ELEMENT, 4)?,
+            make("elements of implicit pressure", sizes.occupied as usize * ELEMENT, 4)?,
             make("nodes of implicit pressure", sizes.nodes as usize * ROW, 4)?,
             make("vectors of implicit pressure", sizes.nodes as usize * VECTORS, 4)?,
             make("bodies that give way", reaches.len() - 1, GIVING_BYTES)?,
             make("nodes that bodies reach", reached as usize * FELT, 4)?,
+            make("places of elements", (sizes.elements + sizes.occupied) as usize, 4)?,
         ];
         let buffers = Self { all: buffers };
         buffers.fill(gpu, model, state, &walls, &parts, sizes);
