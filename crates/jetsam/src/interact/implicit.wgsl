@@ -13,9 +13,13 @@ const PLACES: u32 = 1u;
 const WORSE: f32 = 10.0;
 // How often PBF finds the vectors to neighbours anew in a step.
 const TURNS: u32 = 3u;
-// Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last.
+// The part of the tolerance at which its rounds end before.
+const FIRST: f32 = 0.7;
+// Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last, and
+// if so much of it is of one sign: errors that cancel are for rounds.
 const EVERY: u32 = 2u;
 const WORTH: f32 = 0.8;
+const OF_ONE_SIGN: f32 = 0.05;
 
 fn in_round() -> bool { return clock.running != 0u && solve.phase == ROUNDS; }
 fn ended() -> bool { return clock.running != 0u && solve.phase == ENDING; }
@@ -268,7 +272,11 @@ fn relax_one(i: u32) -> vec3<f32> {
   return vec3<f32>(abs(signed), left * (share - now), signed);
 }
 
-fn tolerance() -> f32 { return select(m.rounds.x, m.rounds.y, !PBF && solve.number == VELOCITIES); }
+fn tolerance() -> f32 {
+  // vectors are not the same when particles have moved: what they find then is to be small too
+  if (PBF) { return FIRST * m.rounds.x; }
+  return select(m.rounds.x, m.rounds.y, solve.number == VELOCITIES);
+}
 
 // A round: whether it was the last, and how fast the next goes on.
 @compute @workgroup_size(256)
@@ -296,7 +304,8 @@ fn judge(@builtin(local_invocation_index) l: u32) {
   solve.small = select(0u, 1u, residual <= tolerance() && held);
   solve.due = 0u;
   if (solve.small == 1u || rounds >= m.rounds.z) { solve.phase = DONE; return; }
-  if (COARSE && (PBF || solve.number == VELOCITIES) && solve.iterations % EVERY == 1u && residual < WORTH * solve.smoothed) {
+  let worth = residual < WORTH * solve.smoothed && abs(sum.z) > OF_ONE_SIGN * sum.x;
+  if (COARSE && worth && solve.iterations % EVERY == 1u && (PBF || solve.number == VELOCITIES)) {
     solve.due = 1u;
     solve.smoothed = residual;
     solve.since = 0.0;
