@@ -836,6 +836,8 @@ mod tests {
             shape,
             counts
         );
+        let (giving, _) = layout(&module, "Giving");
+        assert!(giving.contains(&("first".into(), GIVING_FIRST as u32)));
         let (body, _) = layout(&module, "Body");
         let at = |name: &str| body.iter().find(|m| m.0 == name).map(|m| m.1 as usize);
         assert_eq!(at("angular_acceleration"), Some(offset_of!(Pose, angular_acceleration)));
