@@ -66,7 +66,7 @@ fn implicit_stages_agree() {
     ] {
         implicit_stages_agree_in(&with_rounds(text, solver, 10, false), before);
         // on a budget below 24 PBF has no coarse level
-        implicit_stages_agree_in(&with_rounds(text, solver, if solver == "pbf" { 25 } else { 10 }, true), before);
+        implicit_stages_agree_in(&with_rounds(text, solver, if solver == "pbf" { 24 } else { 10 }, true), before);
     }
 }
 
