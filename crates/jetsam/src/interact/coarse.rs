@@ -17,17 +17,18 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Cells along the side of an element.
-const SIDE: i32 = 2;
+pub const SIDE: i32 = 2;
 /// Corners of an element; bit `a` of a corner's number says at which end of axis `a` it is.
 const CORNERS: usize = 8;
 type Corners = [f32; CORNERS];
 /// Elements summed as one job.
 const JOB: usize = 8;
-/// Most rounds of conjugate gradients, and the part of the residual's square they end at.
-const ROUNDS: u32 = 40;
-const ENOUGH: f64 = 1e-3;
+/// Most rounds of conjugate gradients.
+pub const ROUNDS: u32 = 40;
+/// The part of the residual's square they end at.
+pub const ENOUGH: f64 = 1e-3;
 /// Part of the diagonal by which nodes answer more than they do, and of the largest: what a few particles answer is not trusted.
-const STIFFNESS: f32 = 1e-3;
+pub const STIFFNESS: f32 = 1e-3;
 
 /// Shares on nodes, and what they answer to.
 #[derive(Default)]

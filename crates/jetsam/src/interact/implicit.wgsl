@@ -13,6 +13,13 @@ const PLACES: u32 = 1u;
 const WORSE: f32 = 10.0;
 // How often PBF finds the vectors to neighbours anew in a step.
 const TURNS: u32 = 3u;
+// The part of the tolerance at which its rounds end before.
+const FIRST: f32 = 0.7;
+// Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last, and
+// if so much of it is of one sign: errors that cancel are for rounds.
+const EVERY: u32 = 2u;
+const WORTH: f32 = 0.8;
+const OF_ONE_SIGN: f32 = 0.05;
 
 fn in_round() -> bool { return clock.running != 0u && solve.phase == ROUNDS; }
 fn ended() -> bool { return clock.running != 0u && solve.phase == ENDING; }
@@ -24,8 +31,18 @@ fn begin(number: u32) {
   solve.residual = 0.0;
   solve.since = 0.0;
   solve.best = 3.4e38;
+  solve.smoothed = 3.4e38;
+  solve.due = 0u;
   solve.omega = m.relax.x;
   solve.phase = select(OVER, ROUNDS, live_fluid() > 0u && clock.dt > 0.0);
+}
+
+fn forget_window() {
+  for (var a = 0u; a < 3u; a += 1u) {
+    atomicStore(&solve.low[a], 2147483647);
+    atomicStore(&solve.high[a], -1);
+  }
+  atomicStore(&solve.occupied, 0u);
 }
 
 // A solve begins: of velocities, of places, of the turns of PBF.
@@ -34,6 +51,7 @@ fn begin_velocities() {
   if (clock.running == 0u) { return; }
   solve.said = vec4<f32>(0.0);
   solve.phase = ENDING;   // links are made now
+  forget_window();
 }
 @compute @workgroup_size(1)
 fn velocities() { if (clock.running != 0u) { begin(VELOCITIES); } }
@@ -45,6 +63,7 @@ fn begin_turns() {
   solve.said = vec4<f32>(0.0);
   solve.turn = 0u;
   solve.phase = ENDING;
+  forget_window();
 }
 
 var<workgroup> judged: array<vec3<f32>, 256>;
@@ -249,10 +268,15 @@ fn relax_one(i: u32) -> vec3<f32> {
   let now = relaxed(share, left, stride(solve.since) * by, carried(solve.since) * (share - w.x));
   work[i] = vec4<f32>(share, w.y, rate, w.w);
   spot[i].w = now;
+  if (COARSE) { remains[i] = signed; }
   return vec3<f32>(abs(signed), left * (share - now), signed);
 }
 
-fn tolerance() -> f32 { return select(m.rounds.x, m.rounds.y, !PBF && solve.number == VELOCITIES); }
+fn tolerance() -> f32 {
+  // vectors are not the same when particles have moved: what they find then is to be small too
+  if (PBF) { return FIRST * m.rounds.x; }
+  return select(m.rounds.x, m.rounds.y, solve.number == VELOCITIES);
+}
 
 // A round: whether it was the last, and how fast the next goes on.
 @compute @workgroup_size(256)
@@ -278,7 +302,14 @@ fn judge(@builtin(local_invocation_index) l: u32) {
   let rounds = select(f32(solve.iterations), solve.said.x, PBF);
   let held = PBF || solve.number != VELOCITIES || abs(sum.z) <= f32(live_fluid()) * m.relax.z * clock.dt * clock.dt;
   solve.small = select(0u, 1u, residual <= tolerance() && held);
-  if (solve.small == 1u || rounds >= m.rounds.z) { solve.phase = DONE; }
+  solve.due = 0u;
+  if (solve.small == 1u || rounds >= m.rounds.z) { solve.phase = DONE; return; }
+  let worth = residual < WORTH * solve.smoothed && abs(sum.z) > OF_ONE_SIGN * sum.x;
+  if (COARSE && worth && solve.iterations % EVERY == 1u && (PBF || solve.number == VELOCITIES)) {
+    solve.due = 1u;
+    solve.smoothed = residual;
+    solve.since = 0.0;
+  }
 }
 
 // After the rounds that were queued: on, or halt for more.

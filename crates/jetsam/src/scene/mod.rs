@@ -163,7 +163,7 @@ pub struct Solver {
     #[serde(default = "d::divergence_tolerance")]
     pub divergence_tolerance: f64,
     /// Whether implicit pressure finds its smooth part on a coarse lattice between rounds (E9). Without, rounds bring it through deep water bit by
-    /// bit: to compare by, and on a GPU, which makes rounds alone.
+    /// bit: to compare by.
     #[serde(default = "yes")]
     pub coarse: bool,
     /// Most iterations of implicit pressure in a step, of each kind (E9): a budget for real time. On one below 24 fluids yield under PBF:

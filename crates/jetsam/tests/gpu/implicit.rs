@@ -21,22 +21,52 @@ pub const TESTS: &[Test] = &tests![
     implicit_momentum_is_impulse,
     an_implicit_tank_weighs_what_its_water_weighs,
     implicit_steps_have_the_same_bits,
+    a_coarse_level_halves_the_rounds_of_deep_water,
     the_default_scene_agrees
 ];
 
 const IMPLICIT: [&str; 2] = ["dfsph", "pbf"];
 
-/// A scene with a solver that makes so many rounds, no more and no less.
-fn with_rounds(text: &str, solver: &str, rounds: u32) -> String {
+/// A scene with a solver that makes so many rounds, no more and no less; with or without their coarse level.
+fn with_rounds(text: &str, solver: &str, rounds: u32, coarse: bool) -> String {
     format!(
-        "{text}\n[solver]\npressure = \"{solver}\"\niterations = {rounds}\ntolerance = 1e-6\ndivergence_tolerance = 1e-6\ncoarse = false\n"
+        "{text}\n[solver]\npressure = \"{solver}\"\niterations = {rounds}\ntolerance = 1e-6\ndivergence_tolerance = 1e-6\n\
+         coarse = {coarse}\n"
     )
 }
 
+/// Water round two periodic axes of an odd number of cells; a body lies across where one of them closes.
+const RING: &str = r#"
+[domain]
+min = [0, 0, 0]
+max = [0.6, 0.3, 0.7]
+walls = ["periodic", "periodic", "solid"]
+[resolution]
+spacing = 0.04
+[[fluid]]
+viscosity = 0.1
+shape = { box = { min = [0, 0, 0], max = [0.6, 0.3, 0.4] } }
+velocity = [0.3, 0.1, -0.2]
+[[rigid]]
+name = "across"
+density = 600
+shape = { box = { min = [0.5, 0.05, 0.3], max = [0.7, 0.2, 0.45] } }
+spin = [1, 2, 3]
+"#;
+
 /// E9, stage by stage from one state, with as many rounds on both.
 fn implicit_stages_agree() {
-    for (text, solver, before) in [(TANK, "dfsph", 12), (TANK, "pbf", 12), (FLAT, "dfsph", 20), (FLAT, "pbf", 20)] {
-        implicit_stages_agree_in(&with_rounds(text, solver, 10), before);
+    for (text, solver, before) in [
+        (TANK, "dfsph", 12),
+        (TANK, "pbf", 12),
+        (FLAT, "dfsph", 20),
+        (FLAT, "pbf", 20),
+        (RING, "dfsph", 12),
+        (RING, "pbf", 12),
+    ] {
+        implicit_stages_agree_in(&with_rounds(text, solver, 10, false), before);
+        // on a budget below 24 PBF has no coarse level
+        implicit_stages_agree_in(&with_rounds(text, solver, if solver == "pbf" { 24 } else { 10 }, true), before);
     }
 }
 
@@ -130,8 +160,10 @@ fn compare_implicit(stage: Stage, cpu: &State, gpu: &State) {
 
 /// A hundred steps of equal length and rounds: energies, momentum and bodies. PBF's particles hop at random: of it fewer.
 fn a_hundred_implicit_steps_agree() {
-    for (solver, steps) in [("dfsph", 100), ("pbf", 30)] {
-        let text = with_rounds(FLAT, solver, 8);
+    for (solver, steps, rounds, coarse) in
+        [("dfsph", 100, 8, false), ("pbf", 30, 8, false), ("dfsph", 100, 8, true), ("pbf", 30, 24, true)]
+    {
+        let text = with_rounds(FLAT, solver, rounds, coarse);
         let (mut cpu, mut gpu) = (World::from_scene(&scene(&text)).unwrap(), on_gpu(&text));
         for step in 1..=steps {
             cpu.step(1e-3);
@@ -244,14 +276,37 @@ fn an_implicit_tank_weighs_what_its_water_weighs() {
 }
 
 fn implicit_steps_have_the_same_bits() {
-    for solver in IMPLICIT {
-        let text = format!("{TANK}\n[solver]\npressure = \"{solver}\"\n");
+    for (solver, coarse) in [("dfsph", true), ("pbf", true), ("dfsph", false), ("pbf", false)] {
+        let text = format!("{TANK}\n[solver]\npressure = \"{solver}\"\ncoarse = {coarse}\n");
         let hash = || {
             let mut w = on_gpu(&text);
             assert_eq!(w.run_to(0.03), None);
             (state_hash(w.state()), w.steps())
         };
         assert_eq!(hash(), hash(), "{solver}");
+    }
+}
+
+/// E9: bit by bit, rounds carry pressure through thirty layers of water; the coarse level finds it at once.
+fn a_coarse_level_halves_the_rounds_of_deep_water() {
+    for solver in IMPLICIT {
+        let rounds = |coarse: bool| {
+            let mut w = on_gpu(&format!(
+                "[world]\ndimensions = 2\n[domain]\nmin = [0, 0, 0]\nmax = [0.4, 0, 2]\n[resolution]\nspacing = 0.04\n\
+                 [solver]\npressure = \"{solver}\"\niterations = 2000\ntolerance = 1e-4\ndivergence_tolerance = 1e-4\ncoarse = {coarse}\n\
+                 [[fluid]]\nshape = {{ box = {{ min = [0, 0, 0], max = [0.4, 0, 1.6] }} }}\n"
+            ));
+            let mut made = 0;
+            w.advance(0.05, |w, _| {
+                made += if solver == "pbf" { w.ledger().pressure.iterations } else { w.ledger().divergence.iterations };
+                true
+            });
+            assert_eq!((w.ledger().lost, w.fault().is_none()), (0, true));
+            made
+        };
+        let (with, without) = (rounds(true), rounds(false));
+        println!("{solver}: {with} rounds, {without} without a coarse level");
+        assert!(2 * with <= without, "{solver}: {with} rounds, {without} without a coarse level");
     }
 }
 

@@ -13,6 +13,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering::Relaxed;
 
+/// Errors so much smaller than their mean may be those of rounding: in water that begins to fall these would say who takes part.
+const NOISE: f32 = 0.01;
+
 /// The coarse level, and what it is made from.
 #[derive(Default)]
 pub(super) struct Level {
@@ -26,8 +29,8 @@ pub(super) struct Level {
 
 impl Cpu {
     /// Solves the smooth part of what a round has left, and adds it to the shares.
-    pub(super) fn smooth(&mut self, model: &Model, advance: Advance, round: Round, aim: Aim) {
-        self.lay(model, advance, round, aim);
+    pub(super) fn smooth(&mut self, model: &Model, advance: Advance, round: Round, aim: Aim, residual: f64) {
+        self.lay(model, advance, round, aim, residual);
         let (level, p) = (self.level, &self.state.particles);
         let Implicit { coarse, share, hold, before, left, .. } = &mut self.implicit;
         let Level { coarse, active, between, .. } = coarse;
@@ -48,14 +51,15 @@ impl Cpu {
     }
 
     /// What fluids and bodies answer to smooth shares.
-    fn lay(&mut self, model: &Model, advance: Advance, round: Round, aim: Aim) {
+    fn lay(&mut self, model: &Model, advance: Advance, round: Round, aim: Aim, residual: f64) {
+        let noise = NOISE * residual as f32;
         let n = self.implicit.hold.len();
         let Implicit { coarse: Level { active, none, between, .. }, share, before, left, .. } = &mut self.implicit;
         active.clear();
         active.resize(share.len(), 0.0);
         none.resize(n, 0.0);
         between.resize(n, 0.0);
-        let takes_part = |(before, left): (&f32, &f32)| if *before > 0.0 || *left > 0.0 { 1.0 } else { 0.0 };
+        let takes_part = |(before, left): (&f32, &f32)| if *before > 0.0 || *left > noise { 1.0 } else { 0.0 };
         active[..n].par_iter_mut().zip(before).zip(left).with_min_len(CHUNK).for_each(|((active, before), left)| {
             *active = takes_part((before, left));
         });

@@ -394,7 +394,7 @@ impl Cpu {
             let worth = said.residual < WORTH * smoothed && bias.abs() > smooth;
             if worth && said.iterations % EVERY == 1 && aim != Aim::Places && model.coarse() {
                 (smoothed, round.number) = (said.residual, 0.0);
-                self.smooth(model, advance, round, aim);
+                self.smooth(model, advance, round, aim, said.residual);
             }
         };
         let Implicit { share, hold, before, error, rate, .. } = &mut self.implicit;

@@ -134,13 +134,29 @@ struct Solve {
   small: u32,              // 1 if the last round left little
   residual: f32, iterations: u32, phase: u32, number: u32,
   said: vec4<f32>,         // rounds and residual of places, of velocities
-  turn: u32, stray: atomic<u32>, other: vec2<u32>,
+  turn: u32, stray: atomic<u32>,
+  due: u32,                // 1 if the coarse level follows on this round
+  smoothed: f32,           // residual at its last solve
+  low: array<atomic<i32>, 3>,   // the cells that fluids occupy
+  high: array<atomic<i32>, 3>,
+  occupied: atomic<u32>,   // elements that hold particles
 }
 // What implicit pressure does to a body, and what it got from outside in this step. thrust: by the shares of a round; push: the
 // accelerations by it; steady: by fluids, as it stands for all parts of a step; added: what is in the force besides what was summed.
 struct Swept {
   thrust: vec4<f32>, twist: vec4<f32>, push: vec4<f32>, spin: vec4<f32>, steady: vec4<f32>, steady_torque: vec4<f32>,
   added: vec4<f32>, added_torque: vec4<f32>, outside: vec4<f32>, impulse: vec4<f32>,
+}
+
+// A body under the coarse level: the nodes it may reach; w of size: in the list of those that feel something, who stands at this place.
+struct Giving {
+  low: vec4<i32>, size: vec4<i32>,
+  turn_x: vec4<f32>,       // columns of the inverse inertia, times what motions count in rates; w: inverse mass, alike
+  turn_y: vec4<f32>,       // w: radius (m)
+  turn_z: vec4<f32>,       // w: 1 if fluids move it
+  moved: vec4<f32>, turned: vec4<f32>,
+  largest: atomic<u32>,    // largest force on one of its particles (N, as bits)
+  first: u32,              // where its nodes begin in `reach`
 }
 
 // What a step leaves behind, as `ledger::Ledger`.
@@ -202,6 +218,13 @@ struct Sums {
 @group(0) @binding(39) var<storage, read_write> said: array<vec4<f32>>;     // by workgroups of 128 fluid particles
 @group(0) @binding(40) var<storage, read_write> squeezed: array<vec4<f32>>; // force of shares on bodies' particles (N), as touch
 @group(0) @binding(41) var<storage, read_write> joints: array<Joint>;
+@group(0) @binding(42) var<storage, read_write> remains: array<f32>;        // fluid: what shares have left (compression)
+@group(0) @binding(43) var<storage, read_write> elements: array<f32>;       // coarse level: what particles sum, element by element of those that hold any
+@group(0) @binding(44) var<storage, read_write> rows: array<f32>;           // number by number of all nodes
+@group(0) @binding(45) var<storage, read_write> lattice: array<f32>;        // vector by vector of all nodes
+@group(0) @binding(46) var<storage, read_write> giving: array<Giving>;      // bodies that have rigid slots
+@group(0) @binding(47) var<storage, read_write> reach: array<atomic<i32>>;  // force and torque on each by shares on nodes, in whole numbers
+@group(0) @binding(48) var<storage, read_write> seats: array<u32>;          // by element: which it is of those, or GONE; then which those are
 
 // A flock: as flock::FlockConstants, and its clock. lead: place and velocity of its first agent.
 struct Rule {

@@ -3,7 +3,7 @@
 use super::layout::BLOCK;
 use super::program::{hoses, mortal};
 use crate::model::Model;
-use crate::scene::Pressure;
+use crate::scene::{Coupling, Pressure};
 use crate::stage::Stage;
 
 /// Over what a kernel runs, and how many invocations make a workgroup.
@@ -39,6 +39,14 @@ pub enum Over {
     Particles(u32),
     /// Births of a frame.
     Births(u32),
+    /// Elements of the coarse level of implicit pressure.
+    Elements(u32),
+    /// Those that hold particles: workgroups take one after another.
+    Occupied,
+    /// Its nodes.
+    Nodes(u32),
+    /// Bodies that have rigid slots, one to a workgroup.
+    EachMover,
     /// One workgroup.
     One,
 }
@@ -48,7 +56,7 @@ pub enum Over {
 pub enum Times {
     /// Once.
     Once,
-    /// As many rounds as the solve of that number in a step needs.
+    /// As many pairs of rounds as the solve of that number in a step needs.
     Rounds(usize),
     /// For each part of a step of bodies but the last.
     Parts,
@@ -61,7 +69,7 @@ pub type Section = (Times, &'static [(&'static str, Over)]);
 const DRIFT_BODIES: [(&str, Over); 3] =
     [("half_kick_bodies", Over::Bodies(64)), ("joints_drift", Over::One), ("drift_bodies", Over::Bodies(64))];
 /// A round of shares that push fluids and bodies.
-const ROUND: &[(&str, Over)] = &[
+const ROUND: [(&str, Over); 7] = [
     ("accelerate", Over::Fluids(128)),
     ("press_rigid", Over::Slots(128)),
     ("thrust_parts", Over::RigidParts),
@@ -70,6 +78,33 @@ const ROUND: &[(&str, Over)] = &[
     ("relax", Over::Fluids(128)),
     ("judge", Over::One),
 ];
+/// Two of them; between them the coarse level, if it is due.
+const ROUNDS: &[(&str, Over)] = &[
+    ROUND[0],
+    ROUND[1],
+    ROUND[2],
+    ROUND[3],
+    ROUND[4],
+    ROUND[5],
+    ROUND[6],
+    ("coarse_push", Over::Fluids(128)),
+    ("coarse_elements", Over::Occupied),
+    ("coarse_bodies", Over::EachMover),
+    ("coarse_press", Over::Slots(128)),
+    ("coarse_reach", Over::Slots(128)),
+    ("coarse_nodes", Over::Nodes(128)),
+    ("coarse_solve", Over::One),
+    ("coarse_add", Over::Fluids(128)),
+    ROUND[0],
+    ROUND[1],
+    ROUND[2],
+    ROUND[3],
+    ROUND[4],
+    ROUND[5],
+    ROUND[6],
+];
+/// Two rounds of places.
+const ROUNDS_OF_PLACES: &[(&str, Over)] = &[ROUND[0], ROUND[5], ROUND[6], ROUND[0], ROUND[5], ROUND[6]];
 /// What follows its rounds, walls too.
 const PUSHED: [(&str, Over); 7] = [
     ("close", Over::One),
@@ -142,6 +177,8 @@ pub fn sections(stage: Stage, solver: Pressure) -> &'static [Section] {
                 Once,
                 &[
                     ("begin_velocities", One),
+                    ("coarse_window", Cells(256)),
+                    ("coarse_occupied", Elements(256)),
                     ("links", Fluids(128)),
                     ("seat", Moving(128)),
                     ("flow_of_bodies", Slots(128)),
@@ -149,25 +186,25 @@ pub fn sections(stage: Stage, solver: Pressure) -> &'static [Section] {
                     ("velocities", One),
                 ],
             ),
-            (Rounds(0), ROUND),
+            (Rounds(0), ROUNDS),
             (Once, &PUSHED),
             (Once, &[("load_bodies", Bodies(64)), ("take_velocities", Fluids(128))]),
         ],
         (Stage::Pressure, Pressure::Dfsph) => &[
             (Once, &[("begin_places", One), ("errors_of_places", Moving(128))]),
-            (Rounds(1), &[("accelerate", Fluids(128)), ("relax", Fluids(128)), ("judge", One)]),
+            (Rounds(1), ROUNDS_OF_PLACES),
             (Once, &[("close", One), ("finish", Fluids(128)), ("accelerate", Fluids(128))]),
         ],
         (Stage::Pressure, Pressure::Pbf) => &[
-            (Once, &[("begin_turns", One)]),
+            (Once, &[("begin_turns", One), ("coarse_window", Cells(256)), ("coarse_occupied", Elements(256))]),
             (Once, TURN),
-            (Rounds(0), ROUND),
+            (Rounds(0), ROUNDS),
             (Once, TURNED),
             (Once, TURN),
-            (Rounds(1), ROUND),
+            (Rounds(1), ROUNDS),
             (Once, TURNED),
             (Once, TURN),
-            (Rounds(2), ROUND),
+            (Rounds(2), ROUNDS),
             (Once, TURNED),
             (Once, &[("links", Fluids(128)), ("begin_turn", One), ("straying", One), ("keep_inside", Fluids(128))]),
         ],
@@ -237,6 +274,10 @@ pub fn wanted(name: &str, model: &Model, bodies: bool) -> bool {
         "travel" | "crowd_clock" | "decide" => !model.flocks.is_empty(),
         name if name.contains("agent") => !model.flocks.is_empty(),
         "straying" => bodies,
+        "coarse_bodies" | "coarse_press" | "coarse_reach" => {
+            model.coarse() && bodies && model.solver.coupling == Coupling::Pressure
+        }
+        name if name.starts_with("coarse") => model.coarse(),
         _ => bodies || !(name.contains("bod") || name.contains("part")),
     }
 }

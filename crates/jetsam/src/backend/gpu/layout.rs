@@ -3,6 +3,7 @@
 use super::program::{fields, hoses, joined};
 use crate::flock::FlockConstants;
 use crate::integrate::sources::DrainRegion;
+use crate::interact::coarse::SIDE;
 use crate::model::{DtBound, Model};
 use crate::scene::joint::JointModel;
 use crate::scene::{Force, Pressure, Wall};
@@ -223,11 +224,26 @@ pub struct Sums {
 }
 
 /// How far implicit pressure is: kernels alone read it.
-pub const SOLVE_BYTES: usize = 64;
+pub const SOLVE_BYTES: usize = 96;
 /// `Swept`.
 pub const SWEPT_BYTES: usize = 160;
 /// `Node`.
 pub const NODE_BYTES: usize = 48;
+
+/// `Giving`: a body under the coarse level. Kernels write all of it but where its nodes begin, at this offset.
+pub const GIVING_BYTES: usize = 128;
+/// See there.
+pub const GIVING_FIRST: usize = 116;
+/// Numbers of an element, of a node's row, vectors of nodes; what a body feels of a node.
+pub const ELEMENT: usize = 44;
+/// See there.
+pub const ROW: usize = 27;
+/// See there.
+pub const VECTORS: usize = 5;
+/// See there.
+pub const FELT: usize = 6;
+/// How far beyond its radius a body may reach nodes (spacings).
+pub const BEYOND: f64 = 2.0;
 
 /// A joint.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -311,6 +327,12 @@ pub struct Sizes {
     pub agents: u32,
     /// Most cells of agents, all flocks together.
     pub agent_cells: u32,
+    /// Most elements of the coarse level, of those that hold particles, and nodes.
+    pub elements: u32,
+    /// See there.
+    pub occupied: u32,
+    /// See there.
+    pub nodes: u32,
 }
 
 impl Sizes {
@@ -418,6 +440,37 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
     bytes
 }
 
+/// Most elements and nodes of the coarse level: those over the whole domain.
+pub fn lattice(model: &Model) -> [u64; 2] {
+    let cells = model.grid.cells;
+    let elements = |a: usize| (cells[a] as u64).div_ceil(SIDE as u64);
+    [(0..3).map(elements).product(), (0..3).map(|a| elements(a) + u64::from(cells[a] > 1)).product()]
+}
+
+/// Where the nodes begin that each moving body may reach, and at last their number: those of a box around it; on periodic axes all.
+pub fn reaches(model: &Model, state: &State, movers: u32) -> Vec<u64> {
+    let grid = &model.grid;
+    let nodes = |body: &Body| {
+        let far = radius(state, body) + BEYOND * model.spacing;
+        let along = |a: usize| {
+            let all = (grid.cells[a] as u64).div_ceil(SIDE as u64) + u64::from(grid.cells[a] > 1);
+            let spans = (2.0 * far * f64::from(grid.inverse[a]) / f64::from(SIDE) + 0.001) as u64;
+            if grid.period[a] > 0.0 { all } else { all.min(spans + 3) }
+        };
+        (0..3).map(along).product::<u64>()
+    };
+    let mut first = vec![0];
+    for body in &state.bodies.body[..movers as usize] {
+        first.push(first[first.len() - 1] + nodes(body));
+    }
+    first
+}
+
+/// How far the farthest particle of a body is from its centre of mass (m).
+fn radius(state: &State, body: &Body) -> f64 {
+    state.bodies.offset[body.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max)
+}
+
 /// The pose of a body.
 pub fn pose(body: &Body) -> Pose {
     let x = Wide::vector(body.x, if body.is_static() { 0.0 } else { 1.0 / body.mass });
@@ -439,7 +492,7 @@ pub fn bodies(model: &Model, state: &State, parts: &[[u32; 4]]) -> Vec<GpuBody> 
         let inertia = b.inverse_inertia;
         let first = parts.partition_point(|p| (p[1] as usize) < b.slots.start);
         let count = parts[first..].iter().take_while(|p| p[0] == k as u32).count();
-        let radius = state.bodies.offset[b.slots.clone()].iter().map(|o| o.length()).fold(0.0, f64::max);
+        let radius = radius(state, b);
         let mass = if b.is_static() { 0.0 } else { b.mass };
         let particle = if b.is_static() { 0.0 } else { b.mass / b.slots.len().max(1) as f64 };
         GpuBody {
@@ -750,7 +803,9 @@ mod tests {
             joint_force
         );
         same!("Joint", Joint, anchor_a, anchor_b, axis_a, axis_b, across_a, across_b, turn, law, limits, who);
-        for (name, bytes) in [("Solve", SOLVE_BYTES), ("Swept", SWEPT_BYTES), ("Node", NODE_BYTES)] {
+        for (name, bytes) in
+            [("Solve", SOLVE_BYTES), ("Swept", SWEPT_BYTES), ("Node", NODE_BYTES), ("Giving", GIVING_BYTES)]
+        {
             assert_eq!(layout(&module, name).1 as usize, bytes, "{name}");
         }
         same!(
@@ -781,6 +836,8 @@ mod tests {
             shape,
             counts
         );
+        let (giving, _) = layout(&module, "Giving");
+        assert!(giving.contains(&("first".into(), GIVING_FIRST as u32)));
         let (body, _) = layout(&module, "Body");
         let at = |name: &str| body.iter().find(|m| m.0 == name).map(|m| m.1 as usize);
         assert_eq!(at("angular_acceleration"), Some(offset_of!(Pose, angular_acceleration)));

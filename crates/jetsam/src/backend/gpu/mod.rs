@@ -21,7 +21,8 @@ use kernels::{Over, Times};
 use layout::{Clock, GpuBody, Pose, Sizes, Sums, double};
 use program::{BOUNDS, Kernelet, Program};
 use queue::{Results, Timers};
-use std::collections::VecDeque;
+use std::cell::RefCell;
+use std::collections::{HashMap, VecDeque};
 use std::mem::size_of;
 use std::sync::OnceLock;
 use transfer::Buffers;
@@ -140,13 +141,19 @@ impl OnGpu {
             let (buffers, sizes) =
                 Buffers::new(gpu, model, state, LOGGED, if model.sources.is_empty() { 0 } else { LISTED })?;
             let groups = |over| folded(gpu, groups(over, sizes));
+            // rounds name the same kernels many times
+            let made = RefCell::new(HashMap::new());
             let stage = |stage: Stage| {
                 let wanted = |name| kernels::wanted(name, model, sizes.bodies > 0);
-                let made = |&&(name, over): &&(&'static str, Over)| wanted(name) && groups(over)[0] > 0;
-                let kernel = |&(name, over)| (program.kernel(gpu, name, &buffers.all), groups(over));
+                let runs = |&&(name, over): &&(&'static str, Over)| wanted(name) && groups(over)[0] > 0;
+                let kernel = |&(name, over): &(&'static str, Over)| {
+                    let mut made = made.borrow_mut();
+                    let kernel = made.entry(name).or_insert_with(|| program.kernel(gpu, name, &buffers.all));
+                    (kernel.clone(), groups(over))
+                };
                 let sections = kernels::sections(stage, solver).iter();
                 let sections =
-                    sections.map(|(times, kernels)| (*times, kernels.iter().filter(made).map(kernel).collect()));
+                    sections.map(|(times, kernels)| (*times, kernels.iter().filter(runs).map(kernel).collect()));
                 (stage, sections.collect())
             };
             let timers = Timers::new(gpu, Stage::order(solver).len() as u32);
@@ -483,6 +490,10 @@ fn groups(over: Over, s: Sizes) -> u32 {
         Over::AgentCells(size) => (s.agent_cells + 2).div_ceil(size),
         Over::Particles(size) => (s.fluids + s.slots).div_ceil(size),
         Over::Births(size) => (LISTED as u32).div_ceil(size),
+        Over::Elements(size) => s.elements.div_ceil(size),
+        Over::Occupied => s.occupied.min(4096),
+        Over::Nodes(size) => s.nodes.div_ceil(size),
+        Over::EachMover => s.movers,
         Over::One => 1,
     }
 }

@@ -4,9 +4,11 @@
 //! no other, as devices allow few.
 
 use super::GpuError;
+use super::layout::BEYOND;
 use crate::gpu::Gpu;
 use crate::integrate::sleep;
 use crate::integrate::sources::Bore;
+use crate::interact::coarse;
 use crate::interact::contacts::{DEEP, HELD};
 use crate::interact::pairs::SHIFTED_ABOVE;
 use crate::interact::pressure::BELOW_SUM;
@@ -55,7 +57,11 @@ const TEXTS: [&str; 20] = [
         include_str!("../../interact/forces.wgsl"),
         include_str!("ledger.wgsl")
     ),
-    concat!(include_str!("../../interact/links.wgsl"), include_str!("../../interact/implicit.wgsl")),
+    concat!(
+        include_str!("../../interact/links.wgsl"),
+        include_str!("../../interact/implicit.wgsl"),
+        include_str!("../../interact/coarse.wgsl")
+    ),
     concat!(include_str!("parts.wgsl"), include_str!("../../integrate/joints.wgsl")),
     include_str!("../../flock/agents.wgsl"),
     include_str!("../../flock/decide.wgsl"),
@@ -96,6 +102,7 @@ pub fn text(model: &Model) -> String {
         ("SMOOTH", s.surface == Surface::Smooth),
         ("IMPLICIT", model.implicit()),
         ("PBF", s.pressure == Pressure::Pbf),
+        ("COARSE", model.implicit() && model.coarse()),
         ("FULL_DAMPING", s.damping == Damping::Full),
         ("RUBS", model.rubs()),
         ("SLEEPS", sleep::possible(model)),
@@ -107,6 +114,9 @@ pub fn text(model: &Model) -> String {
         ("SHIFTED_ABOVE", SHIFTED_ABOVE),
         ("TANGENTIAL", TANGENTIAL),
         ("TANGENTIAL_DAMPING", TANGENTIAL_DAMPING),
+        ("STIFFNESS", coarse::STIFFNESS),
+        ("ENOUGH", coarse::ENOUGH as f32),
+        ("BEYOND", BEYOND as f32),
         ("DEEP", DEEP),
         ("HELD", HELD),
         ("TRAVEL", TRAVEL as f32),
@@ -125,6 +135,7 @@ pub fn text(model: &Model) -> String {
         ("JOINED", joined(model).count().max(1)),
         ("HAS_JOINED", joined(model).count()),
         ("HAS_JOINTS", model.joints.len()),
+        ("COARSE_ROUNDS", coarse::ROUNDS as usize),
         ("BY_SOUND", bound_code(DtBound::Sound)),
         ("BY_FORCE", bound_code(DtBound::Force)),
         ("BY_CONTACT", bound_code(DtBound::Contact)),
@@ -148,7 +159,12 @@ pub fn text(model: &Model) -> String {
         let _ = writeln!(text, "const {name}: u32 = {count}u;");
     }
     let rows = if flat { 3 } else { 9 };
-    let _ = writeln!(text, "const SPLIT: i32 = {split};\nconst RUNS: i32 = {};", rows * split);
+    let _ = writeln!(
+        text,
+        "const SPLIT: i32 = {split};\nconst RUNS: i32 = {};\nconst SIDE: i32 = {};",
+        rows * split,
+        coarse::SIDE
+    );
     let (w, g) = (shape(model.kernel.density()), shape(model.kernel.force()));
     let _ = writeln!(text, "fn density_w(s: f32) -> f32 {{ return {w}_w(s); }}");
     let _ = writeln!(text, "fn force_g(s: f32) -> f32 {{ return {g}_g(s); }}");
@@ -225,6 +241,7 @@ pub fn parsed(text: &str) -> Result<(naga::Module, naga::valid::ModuleInfo), Str
 }
 
 /// One kernel, ready to run.
+#[derive(Clone)]
 pub struct Kernelet {
     pub pipeline: wgpu::ComputePipeline,
     pub bound: wgpu::BindGroup,

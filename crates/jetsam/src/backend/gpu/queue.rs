@@ -208,7 +208,7 @@ impl Ready {
             let times = match times {
                 _ if from.is_some() => 0,
                 Times::Once => 1,
-                Times::Rounds(number) => rounds[*number],
+                Times::Rounds(number) => rounds[*number].div_ceil(2),
                 Times::Parts => parts - 1,
             };
             (0..times).for_each(|_| run_all(pass, kernels));

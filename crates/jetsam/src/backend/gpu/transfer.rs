@@ -1,8 +1,8 @@
 //! Buffers of a world on the device, and the ways of a state there and back.
 
 use super::layout::{
-    self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, GONE, GpuBody, Joint, NODE_BYTES, Rule, SOLVE_BYTES, SWEPT_BYTES,
-    Sizes, Slot, Sums, Touch, three, with,
+    self, Agent, BINS, BLOCK, Birth, Crowd, Drifted, ELEMENT, FELT, GIVING_BYTES, GIVING_FIRST, GONE, GpuBody, Joint,
+    NODE_BYTES, ROW, Rule, SOLVE_BYTES, SWEPT_BYTES, Sizes, Slot, Sums, Touch, VECTORS, three, with,
 };
 use super::program::{hoses, mortal};
 use crate::gpu::{Gpu, GpuError};
@@ -81,13 +81,25 @@ impl Buffers {
         let rigid = state.bodies.rigid_slots as u32;
         let slots = state.bodies.record.len() as u32;
         let agents = state.agents.record.len() as u32;
+        let movers = state.bodies.body.iter().filter(|b| b.slots.start < state.bodies.rigid_slots).count() as u32;
+        let coarse = model.implicit() && model.coarse();
+        let [elements, nodes] = if coarse { layout::lattice(model) } else { [0; 2] };
+        let occupied = elements.min(u64::from(fluids));
+        gpu.info.holds_all("elements of implicit pressure", occupied, occupied * (4 * ELEMENT) as u64)?;
+        gpu.info.holds_all("nodes of implicit pressure", nodes, nodes * (4 * ROW) as u64)?;
+        let reaches = if coarse { layout::reaches(model, state, movers) } else { vec![0] };
+        let reached = reaches[reaches.len() - 1];
+        gpu.info.holds_all("nodes that bodies reach", reached, reached * (4 * FELT) as u64)?;
         let sizes = Sizes {
+            elements: elements as u32,
+            occupied: occupied as u32,
+            nodes: nodes as u32,
             fluids,
             rigid,
             slots,
             slipping: if model.rubs() { rigid } else { 0 },
             bodies: state.bodies.body.len() as u32,
-            movers: state.bodies.body.iter().filter(|b| b.slots.start < state.bodies.rigid_slots).count() as u32,
+            movers,
             parts: parts.len() as u32,
             cells: cells as u32,
             groups: (fluids + rigid).div_ceil(512).clamp(1, GROUPS),
@@ -145,9 +157,20 @@ impl Buffers {
             make("sums of rounds", rounds(fluids.div_ceil(128)), 16)?,
             make("forces of shares", rounds(slots), 16)?,
             make("joints", model.joints.len(), size_of::<Joint>())?,
+            make("what shares have left", if coarse { fluids as usize } else { 0 }, 4)?,
+            make("elements of implicit pressure", sizes.occupied as usize * ELEMENT, 4)?,
+            make("nodes of implicit pressure", sizes.nodes as usize * ROW, 4)?,
+            make("vectors of implicit pressure", sizes.nodes as usize * VECTORS, 4)?,
+            make("bodies that give way", reaches.len() - 1, GIVING_BYTES)?,
+            make("nodes that bodies reach", reached as usize * FELT, 4)?,
+            make("places of elements", (sizes.elements + sizes.occupied) as usize, 4)?,
         ];
         let buffers = Self { all: buffers };
         buffers.fill(gpu, model, state, &walls, &parts, sizes);
+        for (k, first) in reaches.iter().enumerate().take(reaches.len() - 1) {
+            let at = (k * GIVING_BYTES + GIVING_FIRST) as u64;
+            gpu.queue.write_buffer(&buffers.all[46], at, bytemuck::bytes_of(&(*first as u32)));
+        }
         Ok((buffers, sizes))
     }
 
