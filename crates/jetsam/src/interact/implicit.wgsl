@@ -16,7 +16,7 @@ const TURNS: u32 = 3u;
 // The part of the tolerance at which its rounds end before.
 const FIRST: f32 = 0.7;
 // Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last, and
-// if so much of it is of one sign: errors that cancel are for rounds.
+// if a weight is not held yet or, of places, if so much of the error is of one sign: errors that cancel are for rounds.
 const EVERY: u32 = 2u;
 const WORTH: f32 = 0.8;
 const OF_ONE_SIGN: f32 = 0.05;
@@ -300,11 +300,13 @@ fn judge(@builtin(local_invocation_index) l: u32) {
   clock.rounds[solve.number] = max(clock.rounds[solve.number], solve.iterations);
   // the turns of PBF share its budget
   let rounds = select(f32(solve.iterations), solve.said.x, PBF);
-  let held = PBF || solve.number != VELOCITIES || abs(sum.z) <= f32(live_fluid()) * m.relax.z * clock.dt * clock.dt;
+  let weight = f32(live_fluid()) * m.relax.z * clock.dt * clock.dt;
+  let held = PBF || solve.number != VELOCITIES || abs(sum.z) <= weight;
   solve.small = select(0u, 1u, residual <= tolerance() && held);
   solve.due = 0u;
   if (solve.small == 1u || rounds >= m.rounds.z) { solve.phase = DONE; return; }
-  let worth = residual < WORTH * solve.smoothed && abs(sum.z) > OF_ONE_SIGN * sum.x;
+  let least = select(OF_ONE_SIGN * sum.x, weight, !PBF && m.relax.z < 1e30);
+  let worth = residual < WORTH * solve.smoothed && abs(sum.z) > least;
   if (COARSE && worth && solve.iterations % EVERY == 1u && (PBF || solve.number == VELOCITIES)) {
     solve.due = 1u;
     solve.smoothed = residual;

@@ -32,7 +32,7 @@ const WORSE: f64 = 10.0;
 /// if a weight is not held yet or, of places, if so much of the error is of one sign: errors that cancel are for rounds.
 const EVERY: u32 = 2;
 const WORTH: f64 = 0.8;
-const SMOOTH: f64 = 0.05;
+const OF_ONE_SIGN: f64 = 0.05;
 
 /// What the solvers keep between rounds, and from one step to the next.
 #[derive(Default)]
@@ -390,8 +390,8 @@ impl Cpu {
             if small || f64::from(said.iterations) >= most {
                 break small;
             }
-            let smooth = if unheld.is_finite() { n as f64 * unheld } else { SMOOTH * error };
-            let worth = said.residual < WORTH * smoothed && bias.abs() > smooth;
+            let least = if unheld.is_finite() { n as f64 * unheld } else { OF_ONE_SIGN * error };
+            let worth = said.residual < WORTH * smoothed && bias.abs() > least;
             if worth && said.iterations % EVERY == 1 && aim != Aim::Places && model.coarse() {
                 (smoothed, round.number) = (said.residual, 0.0);
                 self.smooth(model, advance, round, aim, said.residual);
