@@ -99,9 +99,9 @@ pub struct Input<'a> {
 
 /// A body that answers, and what its particles feel (N) where shares are 1 Pa everywhere.
 pub struct Felt<'a> {
-    /// Inverse of its mass (1/kg), and of the inertia in world axes (1/(kg m^2)).
+    /// Inverse of its mass (1/kg).
     pub inverse_mass: f64,
-    /// See there.
+    /// Inverse of its inertia tensor in world axes (1/(kg m^2)).
     pub inverse_inertia: DMat3,
     /// What a force and an acceleration count together: `scale` by the volume of a fluid particle, by how often bodies count in rates.
     pub factor: f64,
@@ -318,7 +318,7 @@ impl Axis {
     /// The element that holds `x`, or is next to it.
     #[inline(always)]
     fn element(&self, x: f32) -> i32 {
-        let cell = ((x - self.origin) * self.inverse) as i32 - self.first;
+        let cell = (((x - self.origin) * self.inverse) as i32).saturating_sub(self.first);
         (cell.max(0) / SIDE).min(self.elements - 1)
     }
 
