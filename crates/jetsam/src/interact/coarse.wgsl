@@ -524,7 +524,8 @@ fn coarse_add(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
     let part = corner_parts(way, c);
     between += part.x * part.y * part.z * lattice[SHARE * count + node_at(t, at, c)];
   }
-  let now = max(own.w + takes_part(i) * between, 0.0);
+  let change = borne(between, seen(i).w, clock.dt * clock.dt);
+  let now = max(own.w + takes_part(i) * change, 0.0);
   work[i].x += now - own.w;   // what rounds have gone is theirs alone
   spot[i].w = now;
 }
