@@ -91,6 +91,8 @@ pub struct Factors {
     pub laplacian: f32,
     /// Jacobi's factor in rounds of PBF (E9): 0.65 over the largest eigenvalue that a resting lattice has.
     pub relaxation: f32,
+    /// What `|e|^2` sums to over the neighbours of a resting lattice, times `dx^2`: a share's answer to itself.
+    pub response: f32,
     /// How much pressure over density one round of it puts against a compression of a resting lattice, times `dt^2 / dx^2`.
     pub reach: f32,
 }
@@ -112,6 +114,7 @@ impl Factors {
             g: g as f32,
             laplacian: laplacian as f32,
             relaxation: (CAUTION / stiffness) as f32,
+            response: own as f32,
             reach: (CAUTION / stiffness / own) as f32,
         }
     }
@@ -261,6 +264,9 @@ pub const TRAVEL: f64 = 0.1;
 /// Jacobi's factor times the largest eigenvalue on a resting lattice. Rounds diverge where the product with the eigenvalue there is above 1, and
 /// compressed places have larger ones: with 0.9 a dam whose spacing does not fit its box is thrown apart, with 0.65 it is not.
 const CAUTION: f64 = 0.65;
+/// A density's response to its own share, of that on a resting lattice, below which none is believed: dams in the plane are thrown apart by
+/// what is driven in among the particles of a wall with a tenth, not with a quarter or more.
+const LEAST_RESPONSE: f32 = 0.5;
 /// Spacings that a particle pressed by its neighbours may swing in a step of DFSPH; a tank at rest is stable up to 0.6.
 const SWING: f64 = 0.35;
 /// The same in a step of PBF with a small budget of rounds; a dam and a tank are stable up to 0.47. Twice that where there is room for
@@ -304,6 +310,11 @@ impl Model {
     pub fn hold_limit(&self) -> f32 {
         let rho = self.fluids.iter().map(|f| f.density).fold(0.0, f32::max);
         (rho * (self.gravity.length() * self.support) as f32).max(1e-9)
+    }
+
+    /// A particle's density is taken to answer to its own share by no less than this, times `1 / rho_0` (1/m^2; E9).
+    pub fn least_response(&self) -> f32 {
+        LEAST_RESPONSE * self.factors.response / (self.spacing * self.spacing) as f32
     }
 
     /// How far contacts are looked for (m).

@@ -234,6 +234,13 @@ fn fields_have_their_formulas() {
     assert!((u.y - 2.0).abs() < 1e-6 && u.x.abs() < 1e-6 && u.z.abs() < 1e-6);
 }
 
+/// What a density answers to its own share by: the sums of Bender and Koschier 2015, but never less than is stated (E9).
+#[test]
+fn a_density_answers_to_its_own_share_by_no_less_than_stated() {
+    assert_eq!(implicit::response(3.0, 1e-3, 0.2, 50.0), 3.0 * 1e-3 + 0.2);
+    assert_eq!(implicit::response(3.0, 1e-3, 0.02, 50.0), 50.0 * 1e-3);
+}
+
 /// Half of the share of the last step, but no more than moves the density, which a share drives down by `response dt^2`, by 3 % (E9).
 #[test]
 fn corrections_of_places_begin_with_what_moves_a_density_by_three_per_cent_at_most() {

@@ -79,8 +79,8 @@ fn a_deep_column_stands() {
 /// Rounds alone reach a few spacings each, the coarse level the bottom: 80 spacings of water until pressure bears them.
 #[test]
 fn deep_water_takes_fewer_rounds() {
-    // PBF's coarse level is held back by what a share may change in a step
-    for (solver, part) in IMPLICIT.into_iter().zip([0.5, 0.75]) {
+    // what PBF's rounds are for, besides, is what particles that were moved find
+    for (solver, part) in IMPLICIT.into_iter().zip([0.5, 0.6]) {
         let [with, without] = [true, false].map(|coarse| {
             let mut w = world(&format!(
                 "[world]\ndimensions = 2\n[domain]\nmin = [0, 0, 0]\nmax = [0.8, 0, 1.76]\n[resolution]\nspacing = 0.02\n\
@@ -99,6 +99,29 @@ fn deep_water_takes_fewer_rounds() {
             f64::from(with) <= part * f64::from(without),
             "{solver}: {with} rounds, {without} without a coarse level"
         );
+    }
+}
+
+/// A dam runs into a wall: particles are driven in among those of the wall, where hardly anything answers to their share. Pressure takes energy,
+/// it makes none: what a step ends too early or too late is less than a hundredth.
+#[test]
+fn an_impact_throws_nothing() {
+    for spacing in [0.0175, 0.0192, 0.02, 0.0213, 0.022, 0.0227] {
+        let mut w = world(&format!(
+            "[world]\ndimensions = 2\n[domain]\nmin = [0, 0, 0]\nmax = [3, 0, 2]\n[resolution]\nspacing = {spacing}\n\
+             [[fluid]]\nshape = {{ box = {{ min = [0, 0, 0], max = [1, 0, 1] }} }}\n\
+             [solver]\npressure = \"pbf\"\ntolerance = 3e-3\n"
+        ));
+        let energy = |w: &World| w.ledger().kinetic + w.ledger().potential;
+        let mut before = f64::INFINITY;
+        for frame in 1..=6 {
+            w.advance(0.2 * f64::from(frame), |w, _| {
+                let now = energy(w);
+                assert!(now < 1.01 * before, "spacing {spacing}, {} s: {before} J, then {now} J", w.time());
+                before = now;
+                true
+            });
+        }
     }
 }
 
@@ -237,14 +260,14 @@ fn rounds_end_at_the_tolerance_or_at_the_budget_and_are_reported() {
         w.advance(0.2, |w, _| {
             let (p, d) = (w.ledger().pressure, w.ledger().divergence);
             // PBF looks where its rounds have led three times at most, and may then be a little beyond
-            let slack = if solver == "pbf" { 1.1 } else { 1.0 };
+            let slack = if solver == "pbf" { 1.2 } else { 1.0 };
             assert!(p.residual <= slack * 0.0005 && d.residual <= 0.0005, "{solver}: {p:?} {d:?}");
             assert!(p.iterations < 1000 && d.iterations < 1000);
             true
         });
         recorder.frame(&w, Duration::from_secs(1));
         let summary = recorder.summary(&w);
-        assert!(summary.pressure_iterations > 0.0 && summary.pressure_residual <= 0.00055);
+        assert!(summary.pressure_iterations > 0.0 && summary.pressure_residual <= 0.0006);
         let mut w = dam("iterations = 2\ntolerance = 1e-6\ndivergence_tolerance = 1e-6");
         w.advance(0.2, |w, _| {
             let (p, d) = (w.ledger().pressure, w.ledger().divergence);

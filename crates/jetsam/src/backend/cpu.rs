@@ -508,6 +508,9 @@ impl Cpu {
         for kind in [Kind::Rigid, Kind::Static] {
             self.push_slots(model, advance, kind, true);
         }
+        if model.solver.pressure == Pressure::Pbf {
+            self.look_at_bodies(model, advance.part()); // they were moved since they were sorted
+        }
         self.touch(model, advance.dt);
     }
 

@@ -103,7 +103,7 @@ pub struct Felt<'a> {
     pub inverse_mass: f64,
     /// Inverse of its inertia tensor in world axes (1/(kg m^2)).
     pub inverse_inertia: DMat3,
-    /// What a force and an acceleration count together: `scale` by the volume of a fluid particle, by how often bodies count in rates.
+    /// What a force and an acceleration count together: `scale` by the volume of a fluid particle.
     pub factor: f64,
     /// For each particle: a place (m) in the fluid that pushes it, its arm (m), the force (N).
     pub particles: &'a mut dyn Iterator<Item = ([f32; 3], DVec3, DVec3)>,

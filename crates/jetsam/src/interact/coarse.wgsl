@@ -146,7 +146,7 @@ fn coarse_push(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
   }
   let own = takes_part(i);
   let node = nodes[i];
-  total += own * node.twice.xyz;
+  total += own * node.all.xyz;
   flow[i] = vec4<f32>(-node.pull.w * total, own * spread / select(3.0, 2.0, FLAT));
 }
 
@@ -234,7 +234,7 @@ fn coarse_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n
   for (var e = l; e < 6u * volume_of(size); e += 64u) { atomicStore(&reach[6u * giving[k].first + e], 0); }
   if (l != 0u) { return; }
   // a fluid particle gains by what its body gives way: as often as bodies count in rates
-  let factor = select(1.0, 0.5, PBF) * clock.dt * clock.dt / m.per_cell.w;
+  let factor = clock.dt * clock.dt / m.per_cell.w;
   giving[k].low = vec4<i32>(low, 0);
   giving[k].size = vec4<i32>(size, 0);
   giving[k].turn_x = vec4<f32>(factor * spin(b, b.q, vec3<f32>(1.0, 0.0, 0.0)), factor * b.x.w);
@@ -524,8 +524,7 @@ fn coarse_add(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
     let part = corner_parts(way, c);
     between += part.x * part.y * part.z * lattice[SHARE * count + node_at(t, at, c)];
   }
-  let change = borne(between, seen(i).w, clock.dt * clock.dt);
-  let now = max(own.w + takes_part(i) * change, 0.0);
+  let now = max(own.w + takes_part(i) * between, 0.0);
   work[i].x += now - own.w;   // what rounds have gone is theirs alone
   spot[i].w = now;
 }

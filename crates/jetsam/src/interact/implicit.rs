@@ -7,7 +7,7 @@
 //! descent. Called by the stages `divergence` and `pressure`.
 
 use super::lanes::{LANES, Lanes, axes, load, store, vectors};
-use super::links::{Links, Nodes, TWICE, Table};
+use super::links::{Links, Nodes, Table};
 use crate::laws::implicit;
 use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
@@ -42,7 +42,7 @@ pub fn accelerate<S: Simd>(
         let (own, hold) = (load(simd, share, LANES * s), load(simd, hold, LANES * s));
         let inverse_rho = lanes(simd, &nodes.inverse_rho);
         for a in 0..3 {
-            let fluids = unit * sum[a] + own * lanes(simd, &nodes.all[TWICE][a]);
+            let fluids = unit * sum[a] + own * lanes(simd, &nodes.all[a]);
             sum[a] = zero - inverse_rho * (fluids + hold * lanes(simd, &nodes.pull[a]));
         }
         let rows = vectors(simd, sum);
@@ -55,8 +55,7 @@ pub fn accelerate<S: Simd>(
     }
 }
 
-/// `sum (u_i - u_j) . e_ij` of a chunk: the rate at which velocities `u` (m/s) compress (1/s), or accelerations alike; `walls` says how
-/// often bodies and walls count ([`ONCE`](super::links::ONCE), [`TWICE`]).
+/// `sum (u_i - u_j) . e_ij` of a chunk: the rate at which velocities `u` (m/s) compress (1/s), or accelerations alike.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)] // as above
 pub fn rates<S: Simd>(
@@ -64,7 +63,6 @@ pub fn rates<S: Simd>(
     table: &mut Table,
     links: &Links,
     nodes: &[Nodes],
-    walls: usize,
     u: &[[f32; 4]],
     first: usize,
     out: &mut [f32],
@@ -86,7 +84,7 @@ pub fn rates<S: Simd>(
         let own = axes(rows);
         let mut all = f32x16::splat(simd, 0.0);
         for a in 0..3 {
-            all += lanes(simd, &nodes.all[walls][a]) * own[a];
+            all += lanes(simd, &nodes.all[a]) * own[a];
         }
         store(all - unit * sum, out, LANES * s);
     }
@@ -101,8 +99,6 @@ fn lanes<S: Simd>(simd: S, of: &Lanes) -> f32x16<S> {
 /// How shares are relaxed in one round.
 #[derive(Clone, Copy, Debug)]
 pub struct Round {
-    /// How often bodies and walls count: [`ONCE`](super::links::ONCE) or [`TWICE`], in rates.
-    pub walls: usize,
     /// Jacobi's factor.
     pub omega: f32,
     /// From rates of acceleration to what the error counts (s^2; 1 for the divergence).
@@ -154,7 +150,7 @@ pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rat
         for l in 0..LANES {
             let compliance = round.compliance * nodes.inverse_rho[l];
             let left = error[l] + round.scale * rate[l] - compliance * own[l];
-            let answer = round.scale * nodes.response[round.walls][l] + compliance;
+            let answer = round.scale * nodes.response[l] + compliance;
             let by = round.omega / answer;
             // what the share should still change by, in compression: of particles without pressure only the excess counts
             let plain = implicit::relaxed(own[l], left, by, 0.0);

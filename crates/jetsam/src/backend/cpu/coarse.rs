@@ -5,9 +5,7 @@ use super::{CHUNK, Cpu, GONE};
 use crate::integrate::Advance;
 use crate::interact::coarse::{Coarse, Felt, Input};
 use crate::interact::implicit::Round;
-use crate::interact::lanes::LANES;
-use crate::interact::links::TWICE;
-use crate::laws::implicit::{borne, hold as hold_of};
+use crate::laws::implicit::hold as hold_of;
 use crate::model::Model;
 use crate::state::Kind;
 use fearless_simd::dispatch;
@@ -34,18 +32,17 @@ impl Cpu {
     pub(super) fn smooth(&mut self, model: &Model, advance: Advance, round: Round, aim: Aim, residual: f64) {
         self.lay(model, advance, round, aim, residual);
         let (level, p) = (self.level, &self.state.particles);
-        let Implicit { coarse, share, hold, before, left, nodes, .. } = &mut self.implicit;
+        let Implicit { coarse, share, hold, before, left, .. } = &mut self.implicit;
         let Level { coarse, active, between, .. } = coarse;
         coarse.solve(level, &self.cells[Kind::Fluid as usize], &p.record, left);
         let coarse = &*coarse;
         let shares = share.par_chunks_mut(CHUNK).zip(hold.par_chunks_mut(CHUNK)).zip(before.par_chunks_mut(CHUNK));
-        let read = p.record.par_chunks(CHUNK).zip(active.par_chunks(CHUNK)).zip(nodes.par_chunks(CHUNK / LANES));
-        between.par_chunks_mut(CHUNK).zip(read).zip(shares).for_each(|((between, ((record, active), nodes)), all)| {
+        let read = p.record.par_chunks(CHUNK).zip(active.par_chunks(CHUNK));
+        between.par_chunks_mut(CHUNK).zip(read).zip(shares).for_each(|((between, (record, active)), all)| {
             dispatch!(level, simd => coarse.interpolate(simd, record, between));
             let ((share, hold), before) = all;
             for i in 0..between.len() {
-                let response = nodes[i / LANES].response[round.walls][i % LANES];
-                let now = (share[i] + active[i] * borne(between[i], response, round.scale)).max(0.0);
+                let now = (share[i] + active[i] * between[i]).max(0.0);
                 before[i] += now - share[i]; // what rounds have gone is theirs alone
                 share[i] = now;
                 hold[i] = hold_of(now, round.limit);
@@ -89,10 +86,9 @@ impl Cpu {
         if !bodies {
             return;
         }
-        // a fluid particle gains by what its body gives way: as often as bodies count in rates
+        // a fluid particle gains by what its body gives way
         let fluid = &model.fluids[0];
-        let counted = if round.walls == TWICE { 1.0 } else { 0.5 };
-        let factor = counted * f64::from(round.scale) * fluid.density as f64 / fluid.mass as f64;
+        let factor = f64::from(round.scale) * fluid.density as f64 / fluid.mass as f64;
         let (b, first) = (&self.state.bodies, p.first[Kind::Rigid as usize]);
         for body in b.body.iter().filter(|body| Self::movable(body, advance)) {
             let mut particles = body.slots.clone().filter_map(|slot| {

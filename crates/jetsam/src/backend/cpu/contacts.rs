@@ -100,7 +100,7 @@ impl Cpu {
 
     /// Looks at bodies as they are now, for contacts in a step of `dt` (s): what laws ask of them, how near pairs matter, and whether the
     /// lists still hold.
-    fn look_at_bodies(&mut self, model: &Model, dt: f64) {
+    pub(super) fn look_at_bodies(&mut self, model: &Model, dt: f64) {
         let Contacts { kept, solid, reach, hold, skin, farther, .. } = &mut self.contacts;
         let b = &self.state.bodies;
         solid.resize(b.body.len(), Solid::default());

@@ -94,13 +94,6 @@ pub(super) enum Aim {
     Both,
 }
 
-impl Aim {
-    /// How often bodies and walls count in rates.
-    fn walls(self) -> usize {
-        if self == Aim::Both { links::ONCE } else { links::TWICE }
-    }
-}
-
 impl Cpu {
     /// Whether fluids move bodies now: not while a scene settles.
     pub(super) fn movable(body: &Body, advance: Advance) -> bool {
@@ -253,7 +246,7 @@ impl Cpu {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => {
-                    implicit::rates(simd, table, links, nodes, round.walls, flow, c * CHUNK, rate);
+                    implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate);
                     *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, before, left });
                 });
             });
@@ -333,7 +326,7 @@ impl Cpu {
         let Implicit { places, nodes, hold, .. } = &self.implicit;
         let begun = |i: usize| {
             let before = places.get(i).copied().unwrap_or(0.0);
-            begun(before, nodes[i / LANES].response[links::TWICE][i % LANES], advance.dt as f32)
+            begun(before, nodes[i / LANES].response[i % LANES], advance.dt as f32)
         };
         let warm: Vec<f32> = (0..hold.len()).into_par_iter().with_min_len(CHUNK).map(begun).collect();
         self.prepare(model, |i| warm[i]);
@@ -373,7 +366,7 @@ impl Cpu {
         let limit = model.hold_limit();
         let compliance = if aim == Aim::Both { model.compliance() as f32 } else { 0.0 };
         let omega = model.factors.relaxation;
-        let mut round = Round { walls: aim.walls(), omega, scale, compliance, number: 0.0, limit };
+        let mut round = Round { omega, scale, compliance, number: 0.0, limit };
         let (mut said, mut best, mut smoothed) = (Solve::default(), f64::INFINITY, f64::INFINITY);
         let small = loop {
             self.accelerate(model, advance, gravity, aim);
@@ -430,7 +423,7 @@ impl Cpu {
             if aim == Aim::Velocities {
                 with_scratch(|scratch| {
                     let table = &mut scratch.places;
-                    dispatch!(level, simd => implicit::rates(simd, table, links, nodes, aim.walls(), flow, c * CHUNK, rate));
+                    dispatch!(level, simd => implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate));
                 });
             }
             for ((error, rate), density) in error.iter_mut().zip(rate).zip(density) {
@@ -477,7 +470,7 @@ impl Cpu {
             let shares = sum.par_iter_mut().zip(&self.implicit.share).with_min_len(CHUNK);
             shares.for_each(|(sum, share)| *sum = if turn == 0 { *share } else { *sum + *share });
         }
-        self.keep_inside(model);
+        self.ledger.put_back += self.keep_inside(model, DEEP);
         self.implicit.pressure = said;
         self.implicit.added = total;
         let records = self.state.particles.record[..n].par_iter_mut().with_min_len(CHUNK);
@@ -504,10 +497,10 @@ impl Cpu {
                 self.implicit.impulse -= dt * *force;
             }
             if Self::movable(body, advance) && (*force != DVec3::ZERO || *torque != DVec3::ZERO) {
-                give(body, &[dt * *force, dt * *torque]);
                 body.x += dt * dt / body.mass * *force;
                 let turn = dt * dt * (body.inverse_inertia_at(body.q) * *torque);
                 body.q = (glam::DQuat::from_scaled_axis(turn) * body.q).normalize();
+                give(body, &[dt * *force, dt * *torque]); // its spin is that of where it is now
                 moved = true;
             }
         }
@@ -520,15 +513,17 @@ impl Cpu {
 
 /// A fluid particle is kept from going deeper into a solid side of the domain than this many spacings: there the wall's own
 /// particles stand.
-const DEEP: f64 = 0.5;
+pub(super) const DEEP: f64 = 0.5;
+/// The same before PBF has had a say: what stands among a wall's particles it could not move well.
+pub(super) const SHALLOW: f64 = 0.1;
 
 impl Cpu {
-    /// What a step has driven into solid sides of the domain is put back, and loses its velocity into the wall: counted, and in
-    /// the ledger. Pressure holds what comes at its own pace; this is for what is thrown.
-    pub(super) fn keep_inside(&mut self, model: &Model) {
+    /// What a step has driven into solid sides of the domain deeper than so many spacings is put back, and loses its velocity into the wall;
+    /// the impulse goes into the ledger. Pressure holds what comes at its own pace; this is for what is thrown. Says how many were put back.
+    pub(super) fn keep_inside(&mut self, model: &Model, deep: f64) -> u64 {
         let p = &mut self.state.particles;
         let fluid = p.segment(Kind::Fluid);
-        let (grid, deep) = (&model.grid, DEEP * model.spacing);
+        let (grid, deep) = (&model.grid, deep * model.spacing);
         let solid = |a: usize| grid.walls[a] == Wall::Solid && grid.period[a] == 0.0;
         let sides: Vec<_> = (0..3).filter(|&a| solid(a)).collect();
         let ends = |a: usize| ((grid.min[a] - deep) as f32, (grid.max[a] + deep) as f32);
@@ -552,10 +547,10 @@ impl Cpu {
             }
             (count, impulse)
         });
-        for (count, impulse) in put_back.collect::<Vec<(u64, DVec3)>>() {
-            self.ledger.put_back += count;
+        put_back.collect::<Vec<(u64, DVec3)>>().into_iter().fold(0, |sum, (count, impulse)| {
             self.implicit.impulse += impulse;
-        }
+            sum + count
+        })
     }
 }
 

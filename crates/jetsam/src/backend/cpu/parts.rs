@@ -3,6 +3,7 @@
 //! What fluids do to bodies stands still meanwhile; places, contacts and joints are found anew in each part. The last part
 //! ends in the stage `bodies`, where all forces are there anyway.
 
+use super::implicit::{DEEP, SHALLOW};
 use super::{Cpu, sleep};
 use crate::integrate::bodies::{self, first_kick};
 use crate::integrate::{Advance, joints, particles};
@@ -46,7 +47,10 @@ impl Cpu {
             particles::glide(advance, &model.grid, records, carry, places.get(c * CHUNK..).unwrap_or(&[]));
         });
         if model.solver.pressure == Pressure::Dfsph {
-            self.keep_inside(model);
+            self.ledger.put_back += self.keep_inside(model, DEEP);
+        } else {
+            // PBF has had no say yet, but what stands among the particles of a wall it could not move well
+            self.keep_inside(model, SHALLOW);
         }
         let b = &self.state.bodies.body;
         self.implicit.steady = b.iter().map(|body| [body.force_fluid, body.torque_fluid]).collect();

@@ -35,7 +35,8 @@ struct Constants {
   step: vec4<f32>,        // courant, courant_force (implicit pressure: way of a step (m), factor of `pressed`), bound that does not
                           // change (s), stated dt (s) or 0
   rounds: vec4<f32>,      // implicit pressure: tolerances of places and of velocities, most rounds, dt of contacts (s)
-  relax: vec4<f32>,       // the same: Jacobi's factor, compliance (s^2/m^2), most compression that velocities keep on the whole (1/s^2)
+  relax: vec4<f32>,       // the same: Jacobi's factor, compliance (s^2/m^2), most compression that velocities keep on the whole (1/s^2),
+                          // least response of a density to its own share, times rho_0 (1/m^2)
   cells: vec4<u32>,       // cells on each axis; w: their number
   count: vec4<u32>,       // capacity of fluids, slots of rigid bodies, slots of all bodies, bodies
   more: vec4<u32>,        // parts of bodies, blocks of the scan, groups of the ledger, axes that are open (bits)

@@ -228,7 +228,7 @@ pub const SOLVE_BYTES: usize = 96;
 /// `Swept`.
 pub const SWEPT_BYTES: usize = 160;
 /// `Node`.
-pub const NODE_BYTES: usize = 48;
+pub const NODE_BYTES: usize = 32;
 
 /// `Giving`: a body under the coarse level. Kernels write all of it but where its nodes begin, at this offset.
 pub const GIVING_BYTES: usize = 128;
@@ -375,7 +375,7 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
             f.relaxation,
             if s.pressure == Pressure::Pbf { model.compliance() as f32 } else { 0.0 },
             model.unheld().min(1e30) as f32,
-            0.0,
+            model.least_response(),
         ],
         cells: [x, y, z, sizes.cells],
         count: [sizes.fluids, sizes.rigid, sizes.slots, sizes.bodies],

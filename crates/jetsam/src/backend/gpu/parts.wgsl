@@ -30,9 +30,8 @@ fn unload_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n
 // A fluid particle is kept from going deeper into a solid side of the domain than half a spacing: there the wall's own particles
 // stand. What a step has driven there is put back, and loses its velocity into the wall.
 struct Put { x: vec3<f32>, v: vec3<f32>, said: vec4<f32> }
-fn kept_inside(at: vec3<f32>, v: vec3<f32>, mass: f32) -> Put {
+fn kept_inside(at: vec3<f32>, v: vec3<f32>, mass: f32, deep: f32) -> Put {
   var p = Put(at, v, vec4<f32>(0.0));
-  let deep = 0.5 * m.lower.w;
   for (var a = 0u; a < 3u; a += 1u) {
     let low = m.corner[a] - deep;
     let high = m.far_corner[a] + deep;
@@ -69,12 +68,13 @@ fn glide(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     if (CARRIED) { u += carry[i].xyz; }
     if (!PBF) { u += clock.dt * flow[i].xyz; }
     var p = Put(home_all(r.x.xyz + clock.dt * u), r.v.xyz, own);
-    if (!PBF) { p = kept_inside(p.x, p.v, m.fluids[info[i].y].mass); }
-    own = p.said;
+    // PBF has had no say yet, but what stands among the particles of a wall it could not move well: what walls took waits for its end
+    p = kept_inside(p.x, p.v, m.fluids[info[i].y].mass, select(0.5, 0.1, PBF) * m.lower.w);
+    if (!PBF) { own = p.said; }
     var rates = vec4<f32>(0.0);
     if (MORTAL) { rates = rate[i]; }
     // forces are found anew: in their place goes the share by which places begin at the next step
-    let a = vec4<f32>(select(spot[i].w, 0.0, PBF), 0.0, 0.0, push[i].w);
+    let a = vec4<f32>(select(vec3<f32>(spot[i].w, 0.0, 0.0), p.said.xyz, PBF), push[i].w);
     drifted[i] = Drifted(vec4<f32>(p.x, r.x.w), vec4<f32>(p.v, r.v.w), a, rates, info[i].x, info[i].y, vec2<u32>(0u));
   }
   say_put(g.y * n.x + g.x, l, own);
@@ -86,9 +86,9 @@ fn keep_inside(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
   var own = vec4<f32>(0.0);
   if (clock.running != 0u && i < live_fluid()) {
     let r = records[i];
-    let p = kept_inside(r.x.xyz, r.v.xyz, m.fluids[info[i].y].mass);
+    let p = kept_inside(r.x.xyz, r.v.xyz, m.fluids[info[i].y].mass, 0.5 * m.lower.w);
     records[i] = Record(vec4<f32>(p.x, r.x.w), vec4<f32>(p.v, select(r.v.w, work[i].w, solve.turn > 0u)));
-    own = p.said;
+    own = p.said + vec4<f32>(push[i].xyz, 0.0);
   }
   say_put(g.y * n.x + g.x, l, own);
 }
