@@ -274,8 +274,8 @@ const SWING: f64 = 0.35;
 const SWING_PBF: f64 = 0.4;
 /// With so many rounds a step there is room for that.
 const ROOM: f64 = 24.0;
-/// Rounds of PBF end at no larger error than this, but for want of a budget.
-const LOOSE: f64 = 0.003;
+/// Rounds of PBF end at no larger error than this: with more, places are so wrong that particles are pushed about, and steps get shorter by it.
+const LOOSE: f64 = 0.005;
 /// No step is cut into more steps of bodies than this.
 const MOST_SUBSTEPS: f64 = 1000.0;
 
@@ -491,7 +491,7 @@ impl Model {
     /// speed (E29).
     pub(crate) fn bounds_of_flow(&self) -> [f64; 2] {
         let pressed = match self.solver.pressure {
-            Pressure::Pbf if self.budget() >= ROOM => 0.0,
+            Pressure::Pbf if self.solver.iterations >= ROOM => 0.0,
             Pressure::Pbf => self.courant_flow() / SWING_PBF,
             _ => self.courant_flow() / SWING,
         };
@@ -502,7 +502,7 @@ impl Model {
     /// the longest step: a fluid with a speed of sound. Without it, it would be stiffer in shorter steps, and gain energy by each step that
     /// is shortened while it is compressed.
     pub fn compliance(&self) -> f64 {
-        let n = self.budget();
+        let n = self.solver.iterations;
         let reach = 2.0 / 3.0 * n * (n + 1.0) * f64::from(self.factors.reach);
         (self.longest_step() / self.spacing).powi(2) / reach
     }
@@ -514,21 +514,9 @@ impl Model {
         if g > 0.0 { 0.25 * g / self.depth.max(self.spacing) } else { f64::INFINITY }
     }
 
-    /// Most rounds of a solve of implicit pressure, or of a step of PBF. PBF that may leave much makes as many as leave that in a tank at
-    /// rest: rounds that end as soon as the mean is small would leave now more and now less, and waves grow by it.
-    pub fn budget(&self) -> f64 {
-        let s = &self.solver;
-        if s.pressure != Pressure::Pbf || s.tolerance <= LOOSE {
-            return s.iterations;
-        }
-        // 2/3 n (n + 1) reach = 0.65 swing^2 / tolerance: half of what the bottom yields, and a third more for rounds that are not over
-        let product = 0.65 * SWING_PBF * SWING_PBF / s.tolerance / (2.0 / 3.0 * f64::from(self.factors.reach));
-        s.iterations.min(((0.25 + product).sqrt() - 0.5).ceil())
-    }
-
     /// Whether rounds have a coarse level: not on a budget, whose fluid yields as far as its rounds alone reach.
     pub fn coarse(&self) -> bool {
-        self.solver.coarse && (self.solver.pressure != Pressure::Pbf || self.budget() >= ROOM)
+        self.solver.coarse && (self.solver.pressure != Pressure::Pbf || self.solver.iterations >= ROOM)
     }
 
     /// Mean compression at which rounds that correct places end.
@@ -545,7 +533,7 @@ impl Model {
         if !pbf || weight == 0.0 {
             return longest;
         }
-        let swing = if self.budget() < ROOM { SWING_PBF } else { 2.0 * SWING_PBF };
+        let swing = if self.solver.iterations < ROOM { SWING_PBF } else { 2.0 * SWING_PBF };
         longest.min(swing * self.spacing / weight.sqrt())
     }
 

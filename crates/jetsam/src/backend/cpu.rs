@@ -348,18 +348,20 @@ impl Cpu {
         let range = range.start..range.start + slots.len();
         p.count[kind as usize] = inside;
         let (order, place, base) = (&cells.order, &self.place, range.start);
-        let [x, y, z] = &mut self.places.x;
+        let Places { x: [x, y, z], volume } = &mut self.places;
         chunks_mut!(p.record, range.clone())
             .zip(chunks_mut!(p.id, range.clone()))
             .zip(chunks_mut!(p.owner, range.clone()))
-            .zip(chunks_mut!(x, range.clone()).zip(chunks_mut!(y, range.clone())).zip(chunks_mut!(z, range)))
+            .zip(chunks_mut!(x, range.clone()).zip(chunks_mut!(y, range.clone())).zip(chunks_mut!(z, range.clone())))
+            .zip(chunks_mut!(volume, range))
             .zip(order[..slots.len()].par_chunks(CHUNK))
             .enumerate()
-            .for_each(|(c, ((((record, id), owner), ((x, y), z)), order))| {
+            .for_each(|(c, (((((record, id), owner), ((x, y), z)), volume), order))| {
                 for (k, from) in order.iter().enumerate() {
                     let slot = slots.start + from.load(Relaxed) as usize;
                     record[k] = b.record[slot];
                     [x[k], y[k], z[k]] = record[k].x;
+                    volume[k] = record[k].volume;
                     id[k] = slot as u32;
                     owner[k] = b.owner[slot];
                     let at = c * CHUNK + k;

@@ -304,7 +304,7 @@ pub fn sum(
         let Some(felt) = &felt else { return sum };
         let axes = DMat3::from_quat(body.q);
         for slot in slots {
-            let Some(felt) = felt(slot) else { continue };
+            let Some(felt) = felt(slot).filter(|felt| *felt != [[0.0; 3]; 3]) else { continue };
             let arm = axes * offset[slot];
             for (k, f) in felt.into_iter().map(|f| DVec3::from(f.map(f64::from))).enumerate() {
                 sum.force[k] += f;

@@ -9,7 +9,7 @@ use super::slices::Slices;
 use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
 use crate::scene::Coupling;
-use crate::state::{Kind, Record};
+use crate::state::Kind;
 use fearless_simd::Simd;
 use std::ops::Range;
 
@@ -53,7 +53,7 @@ pub fn fluid_chunk<S: Simd>(
                 let mut total = volume * sum_w(simd, &w[run(Kind::Fluid)]);
                 for &kind in bodies {
                     if runs.count(kind) > 0 {
-                        total += sum_vw(simd, &w[run(kind)], &list[run(kind)], around.records);
+                        total += sum_vw(simd, &w[run(kind)], &list[run(kind)], &around.places.volume);
                     }
                 }
                 density[i - start] = factor * total;
@@ -79,7 +79,7 @@ pub fn body_chunk<S: Simd>(
 
 /// Squared distances become `w(s)`, in one flat loop: of short loops over sixteen lanes the compiler makes scalars.
 #[inline(always)]
-fn weigh(kernel: Kernel, inverse: f32, r_sq: &mut [f32]) {
+pub fn weigh(kernel: Kernel, inverse: f32, r_sq: &mut [f32]) {
     each_kernel!(kernel, K => {
         for r in r_sq {
             *r = K.w(r.sqrt() * inverse);
@@ -101,11 +101,11 @@ fn sum_w<S: Simd>(simd: S, w: &[Block]) -> f32 {
 
 /// `sum V_j w(s)` over a run.
 #[inline(always)]
-fn sum_vw<S: Simd>(simd: S, w: &[Block], list: &[[u32; LANES]], records: &[Record]) -> f32 {
+fn sum_vw<S: Simd>(simd: S, w: &[Block], list: &[[u32; LANES]], volume: &[f32]) -> f32 {
     let mut total: Lanes = [0.0; LANES];
     for (w, j) in w.iter().zip(list) {
         for l in 0..LANES {
-            total[l] += w.0[l] * records[j[l] as usize].volume;
+            total[l] += w.0[l] * volume[j[l] as usize];
         }
     }
     sum(simd, &total)

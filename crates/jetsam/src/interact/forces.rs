@@ -221,10 +221,12 @@ fn on_body<S: Simd, const PLAIN: bool>(
         }
         force += pairs.total(simd);
     }
-    let fluids = list[runs.exact(Kind::Fluid)].iter().copied();
-    force += sum_contacts(input, own, fluids, |other, fluid| {
-        springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
-    });
+    if any_springs(model, kind) {
+        let fluids = list[runs.exact(Kind::Fluid)].iter().copied();
+        force += sum_contacts(input, own, fluids, |other, fluid| {
+            springs(model, kind, other).then(|| model.coupling_pair(fluid, owner))
+        });
+    }
     touch.fluid = force.to_array();
     if model.moves(owner) {
         force += fields(model, own) * input.particle_mass[owner as usize];
@@ -236,7 +238,19 @@ fn on_body<S: Simd, const PLAIN: bool>(
 /// where the fluid particle has no pressure (spray), as nothing else would hold it outside; implicit pressure does.
 #[inline(always)]
 fn springs(model: &Model, kind: Kind, fluid: &Record) -> bool {
-    (kind == Kind::Rigid && model.solver.coupling == Coupling::Spring) || fluid.share <= 0.0 && !model.implicit()
+    any_springs(model, kind) && (fluid.share <= 0.0 || always_springs(model, kind))
+}
+
+/// Whether any may.
+#[inline(always)]
+fn any_springs(model: &Model, kind: Kind) -> bool {
+    always_springs(model, kind) || !model.implicit()
+}
+
+/// Whether all do.
+#[inline(always)]
+fn always_springs(model: &Model, kind: Kind) -> bool {
+    kind == Kind::Rigid && model.solver.coupling == Coupling::Spring
 }
 
 /// Sum of the forces (E12) of springs between a fluid's particle and bodies'. `constants` gives spring and dashpot for the other and its owner, or

@@ -174,15 +174,15 @@ pub fn store<S: Simd>(x: f32x16<S>, to: &mut [f32], at: usize) {
     }
 }
 
-/// Sixteen vectors of four numbers, the first three axis by axis.
+/// Sixteen vectors of four numbers, axis by axis.
 #[inline(always)]
-pub fn axes<S: Simd>([r0, r1, r2, r3]: [f32x16<S>; 4]) -> [f32x16<S>; 3] {
+pub fn axes<S: Simd>([r0, r1, r2, r3]: [f32x16<S>; 4]) -> [f32x16<S>; 4] {
     let (xz0, y0) = (r0.unzip_low(r1), r0.unzip_high(r1));
     let (xz1, y1) = (r2.unzip_low(r3), r2.unzip_high(r3));
-    [xz0.unzip_low(xz1), y0.unzip_low(y1), xz0.unzip_high(xz1)]
+    [xz0.unzip_low(xz1), y0.unzip_low(y1), xz0.unzip_high(xz1), y0.unzip_high(y1)]
 }
 
-/// The reverse of [`axes`]: the fourth number is 0.
+/// The reverse of [`axes`] for vectors of three numbers: the fourth is 0.
 #[inline(always)]
 pub fn vectors<S: Simd>(simd: S, [x, y, z]: [f32x16<S>; 3]) -> [f32x16<S>; 4] {
     let zero = f32x16::splat(simd, 0.0);
@@ -358,7 +358,7 @@ mod tests {
             for l in 0..LANES {
                 assert_eq!(rows[l / 4].to_array()[4 * (l % 4)..][..4], [x[0][l], x[1][l], x[2][l], 0.0]);
             }
-            assert_eq!(axes(rows).map(|c| c.to_array()), x);
+            assert_eq!(axes(rows).map(|c| c.to_array()), [x[0], x[1], x[2], [0.0; LANES]]);
         });
     }
 

@@ -8,18 +8,18 @@
 //! where the neighbour stands among the values around the chunk, which a [`Table`] holds together.
 
 use super::boundary::acceleration;
-use super::density::weights;
-use super::lanes::{LANES, Lanes, Near, axes, gather, listed, sum};
+use super::density::weigh;
+use super::lanes::{Block, Indices, LANES, Lanes, Near, Transposed, axes, gather, listed, sum};
 use super::neighbours::NeighbourChunk;
 use super::pairs::wrap_lanes;
 use super::slices::{Own, Slices, splat};
 use crate::laws::implicit;
-use crate::laws::kernel::{Kernel, each_kernel};
+use crate::laws::kernel::each_kernel;
 use crate::model::Model;
 use crate::scene::Coupling;
 use crate::state::{Body, Kind, Record};
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x4, f32x16, i32x16};
+use fearless_simd::{f32x4, f32x16, i32x16, u32x16};
 use glam::Vec3;
 
 /// A neighbour of each of sixteen fluid particles: 128 bytes.
@@ -60,11 +60,17 @@ impl Link {
 
     /// Vectors of the neighbours, axis by axis.
     #[inline(always)]
-    pub fn vectors<S: Simd>(&self, simd: S, table: &[[f32; 4]; PLACES]) -> [f32x16<S>; 3] {
-        let row = |k: usize| f32x4::load_array_ref(simd, &table[self.to(k)]);
-        let four = |k: usize| row(k).combine(row(k + 1)).combine(row(k + 2).combine(row(k + 3)));
-        axes([four(0), four(4), four(8), four(12)])
+    pub fn vectors<S: Simd>(&self, simd: S, table: &[[f32; 4]; PLACES]) -> [f32x16<S>; 4] {
+        vectors_at(simd, table, |l| self.to(l))
     }
+}
+
+/// Vectors at the places `to` of sixteen lanes, axis by axis.
+#[inline(always)]
+fn vectors_at<S: Simd>(simd: S, table: &[[f32; 4]; PLACES], to: impl Fn(usize) -> usize) -> [f32x16<S>; 4] {
+    let row = |l: usize| f32x4::load_array_ref(simd, &table[to(l)]);
+    let four = |l: usize| row(l).combine(row(l + 1)).combine(row(l + 2).combine(row(l + 3)));
+    axes([four(0), four(4), four(8), four(12)])
 }
 
 /// Links of a chunk of fluid particles, kept while a solver iterates. Their vectors are whole numbers of `unit`, the same for all
@@ -90,19 +96,68 @@ pub const PLACES: usize = 1 << 16;
 pub struct Table {
     numbers: Vec<f32>,
     vectors: Vec<[f32; 4]>,
+    slots: Slots,
+}
+
+/// Neighbours of sixteen particles, slot by slot. The kernel is evaluated over all of them at once: of short loops over
+/// sixteen lanes the compiler makes scalars.
+#[derive(Default)]
+struct Slots {
+    /// To the particle from its neighbour (m), axis by axis.
+    d: Vec<[Block; 3]>,
+    /// Its square, and then what the kernel makes of it.
+    r_sq: Vec<Block>,
+    /// Volumes of the neighbours (m^3).
+    volume: Vec<Block>,
+    /// Places of the neighbours, 0 for those of walls.
+    to: Vec<Indices>,
+}
+
+impl Slots {
+    #[inline(always)]
+    fn clear(&mut self) {
+        self.d.clear();
+        self.r_sq.clear();
+        self.volume.clear();
+        self.to.clear();
+    }
+
+    /// Adds neighbours of particles at `x`, at `[x, y, z]` with a volume.
+    #[inline(always)]
+    fn push<S: Simd>(&mut self, simd: S, model: &Model, own: &Own, other: [Lanes; 4], to: [u32; LANES]) {
+        let [x, y, z, volume] = other;
+        let (d, r_sq) = wrap_lanes(simd, model, &own.at.x, &[x, y, z]);
+        self.d.push(d.map(Block));
+        self.r_sq.push(Block(r_sq));
+        self.volume.push(Block(volume));
+        self.to.push(Indices(to));
+    }
+
+    /// All squares, and volumes beside them.
+    #[inline(always)]
+    fn flat(&mut self) -> (&mut [f32], &[f32]) {
+        (bytemuck::cast_slice_mut(&mut self.r_sq), bytemuck::cast_slice(&self.volume))
+    }
+}
+
+/// Positions and volumes of sixteen particles of walls.
+#[inline(always)]
+fn of_walls<S: Simd>(simd: S, near: Near) -> [Lanes; 4] {
+    let Transposed { x: [x, y, z], volume, .. } = gather(simd, near);
+    [x, y, z, volume]
 }
 
 impl Table {
     /// Numbers around a chunk.
     #[inline(always)]
     pub fn numbers(&mut self, links: &Links, of: &[f32]) -> &[f32; PLACES] {
-        links.collect(of, &mut self.numbers)
+        links.collect(of, |x| *x, &mut self.numbers)
     }
 
     /// Vectors around a chunk.
     #[inline(always)]
     pub fn vectors(&mut self, links: &Links, of: &[[f32; 4]]) -> &[[f32; 4]; PLACES] {
-        links.collect(of, &mut self.vectors)
+        links.collect(of, |u| *u, &mut self.vectors)
     }
 }
 
@@ -124,26 +179,45 @@ impl Links {
         }
     }
 
-    /// Adds a neighbour to each of sixteen particles, and rounds the vectors to what is kept of them.
+    /// Places of fluid or rigid particles.
     #[inline(always)]
-    fn push(&mut self, index: &[u32; LANES], e: &mut [Lanes; 3]) {
+    fn places(&self, index: &[u32; LANES]) -> [u32; LANES] {
         let mut offset = [self.halo.first().map_or(0, |run| run[2]); LANES];
         for &[begin, _, by] in self.halo.iter().skip(1) {
             for l in 0..LANES {
                 offset[l] = if index[l] >= begin { by } else { offset[l] };
             }
         }
-        let [x, y, z] = e;
-        let inverse = 1.0 / self.unit;
-        let (x, y, z) =
-            (counted(x, self.unit, inverse), counted(y, self.unit, inverse), counted(z, self.unit, inverse));
-        let link = &mut self.links[self.used];
+        let mut to = [0; LANES];
         for l in 0..LANES {
-            let to = index[l].wrapping_sub(offset[l]).min(PLACES as u32 - 1);
-            link.xy[l] = (x[l] & 0xffff | y[l] << 16) as i32;
-            link.z_to[l] = (z[l] << 16 | to) as i32;
+            to[l] = index[l].wrapping_sub(offset[l]).min(PLACES as u32 - 1);
         }
+        to
+    }
+
+    /// Adds a neighbour to each of sixteen particles; returns the vectors as they are kept, in whole numbers of the unit.
+    #[inline(always)]
+    fn push<S: Simd>(&mut self, simd: S, to: &[u32; LANES], e: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+        let (unit, most) = (f32x16::splat(simd, self.unit), f32x16::splat(simd, f32::from(i16::MAX)));
+        let inverse = f32x16::splat(simd, 1.0 / self.unit);
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut count, mut kept) = ([i32x16::splat(simd, 0); 3], [zero; 3]);
+        for a in 0..3 {
+            let times = (e[a] * inverse).max(zero - most).min(most).round_ties_even();
+            (count[a], kept[a]) = (times.to_int(), unit * times);
+        }
+        let (link, low) = (&mut self.links[self.used], i32x16::splat(simd, 0xffff));
+        let to: u32x16<S> = u32x16::load_array_ref(simd, to);
+        ((count[0] & low) | (count[1] << 16)).store_array(&mut link.xy);
+        ((count[2] << 16) | to.bitcast::<i32x16<S>>()).store_array(&mut link.z_to);
         self.used += 1;
+        kept
+    }
+
+    /// Positions (m) and rest volumes (m^3) around the chunk.
+    #[inline(always)]
+    fn points<'t>(&self, records: &[Record], table: &'t mut Vec<[f32; 4]>) -> &'t [[f32; 4]; PLACES] {
+        self.collect(records, |Record { x: [x, y, z], volume, .. }| [*x, *y, *z, *volume], table)
     }
 
     /// The links of slice `s`, slot by slot.
@@ -155,33 +229,22 @@ impl Links {
 
     /// Brings the values around the chunk together.
     #[inline(always)]
-    fn collect<'t, T: Copy + Default>(&self, of: &[T], table: &'t mut Vec<T>) -> &'t [T; PLACES] {
-        table.resize(PLACES, T::default());
+    fn collect<'t, T, U: Copy + Default>(
+        &self,
+        of: &[T],
+        part: impl Fn(&T) -> U,
+        table: &'t mut Vec<U>,
+    ) -> &'t [U; PLACES] {
+        table.resize(PLACES, U::default());
         let mut at = 0;
         for &[begin, end, _] in &self.halo {
             let run = &of[begin as usize..end as usize];
             let fits = run.len().min(PLACES - at);
-            table[at..at + fits].copy_from_slice(&run[..fits]);
+            table[at..at + fits].iter_mut().zip(run).for_each(|(to, from)| *to = part(from));
             at += fits;
         }
         table.first_chunk().expect("resized above")
     }
-}
-
-/// Added to a number, leaves its nearest whole number in the last bits.
-const ROUND: f32 = 12_582_912.0;
-
-/// How often `unit` (given by its inverse) goes into sixteen numbers, in the lower 16 bits, and what that many are.
-#[inline(always)]
-fn counted(x: &mut Lanes, unit: f32, inverse: f32) -> [u32; LANES] {
-    let mut counts = [0; LANES];
-    let most = f32::from(i16::MAX);
-    for l in 0..LANES {
-        let shifted = (x[l] * inverse).clamp(-most, most) + ROUND;
-        counts[l] = shifted.to_bits();
-        x[l] = unit * (shifted - ROUND);
-    }
-    counts
 }
 
 /// Sums over the neighbours of sixteen fluid particles.
@@ -216,84 +279,129 @@ pub struct Input<'a> {
 }
 
 /// What sixteen particles sum.
-#[derive(Default)]
-struct Sums {
-    fluid: [Lanes; 3],
-    solid: [Lanes; 3],
-    pull: [Lanes; 3],
-    pairs: Lanes,
-    spread: Lanes,
+struct Sums<S: Simd> {
+    fluid: [f32x16<S>; 3],
+    solid: [f32x16<S>; 3],
+    pull: [f32x16<S>; 3],
+    pairs: f32x16<S>,
+    spread: f32x16<S>,
 }
 
 /// Links and nodes of a chunk of fluid particles.
 #[inline(always)]
-pub fn chunk<S: Simd>(simd: S, input: Input, slices: &Slices, links: &mut Links, nodes: &mut [Nodes]) {
-    let model = input.model;
+pub fn chunk<S: Simd>(
+    simd: S,
+    table: &mut Table,
+    input: Input,
+    slices: &Slices,
+    links: &mut Links,
+    nodes: &mut [Nodes],
+) {
+    let Input { model, records, owner, .. } = input;
+    let (inverse, factor) = (model.inverse_support(), model.factors.g);
     let least = model.least_response();
     links.clear(slices, model.longest_link());
+    let Table { vectors, slots, .. } = table;
+    let around = links.points(records, vectors);
     for ((s, _), nodes) in slices.each().zip(nodes) {
-        let own = Own::slice(simd, input.records, slices, s);
+        let own = Own::slice(simd, records, slices, s);
         let mut rho = [model.fluids[0].density; LANES];
         if model.fluids.len() > 1 {
             for l in 0..LANES {
-                rho[l] = model.fluids[input.owner[own.i[l] as usize] as usize].density;
+                rho[l] = model.fluids[owner[own.i[l] as usize] as usize].density;
             }
         }
-        let mut sums = Sums::default();
-        run::<S, true>(simd, &input, slices, s, &own, &rho, Kind::Fluid, links, &mut sums);
-        for &kind in bodies(model) {
-            if slices.has(s, kind) {
-                run::<S, false>(simd, &input, slices, s, &own, &rho, kind, links, &mut sums);
+        slots.clear();
+        for kind in kinds(model) {
+            for near in slices.run(records, s, kind) {
+                if kind == Kind::Static {
+                    slots.push(simd, model, &own, of_walls(simd, near), [0; LANES]);
+                } else {
+                    let to = links.places(near.index);
+                    let other = vectors_at(simd, around, |l| to[l] as usize).map(|c| c.to_array());
+                    slots.push(simd, model, &own, other, to);
+                }
             }
         }
+        let (along_d, volume) = slots.flat();
+        each_kernel!(model.kernel.force(), K => for (r_sq, volume) in along_d.iter_mut().zip(volume) {
+            *r_sq = implicit::link(*volume, factor * K.g(r_sq.sqrt() * inverse));
+        });
+        let Sums { fluid, solid, pull, pairs, spread } = sums(simd, &input, slices, s, &rho, slots, links);
         links.ends.push(links.used as u32);
+        let (pairs, spread) = (pairs.to_array(), spread.to_array());
+        let (fluid, solid) = (fluid.map(|f| f.to_array()), solid.map(|f| f.to_array()));
         for l in 0..LANES {
             let inverse_rho = 1.0 / rho[l];
             nodes.inverse_rho[l] = inverse_rho;
             let mut all_sq = 0.0;
             for a in 0..3 {
-                let all = sums.fluid[a][l] + 2.0 * sums.solid[a][l];
+                let all = fluid[a][l] + 2.0 * solid[a][l];
                 (all_sq, nodes.all[a][l]) = (all_sq + all * all, all);
             }
-            nodes.response[l] = implicit::response(all_sq, inverse_rho, sums.pairs[l], least);
+            nodes.response[l] = implicit::response(all_sq, inverse_rho, pairs[l], least);
+            nodes.spread[l] = spread[l] / model.dimensions as f32;
         }
-        nodes.pull = sums.pull;
-        for l in 0..LANES {
-            nodes.spread[l] = sums.spread[l] / model.dimensions as f32;
-        }
+        nodes.pull = pull.map(|p| p.to_array());
     }
 }
 
 /// Densities (E1) of a chunk of fluid particles where they are now, amid the neighbours they had.
 #[inline(always)]
-pub fn densities<S: Simd>(simd: S, model: &Model, records: &[Record], slices: &Slices, density: &mut [f32]) {
-    let (kernel, inverse) = (model.kernel.density(), model.inverse_support());
-    let at_center = kernel.w(0.0);
+pub fn densities<S: Simd>(
+    simd: S,
+    table: &mut Table,
+    model: &Model,
+    records: &[Record],
+    slices: &Slices,
+    links: &Links,
+    density: &mut [f32],
+) {
+    let kernel = model.kernel.density();
+    let at_center = f32x16::splat(simd, kernel.w(0.0));
+    // where a kernel is nothing
+    let far = f32x16::splat(simd, 4.0 * (model.support * model.support) as f32);
+    let Table { vectors, slots, .. } = table;
+    let around = links.points(records, vectors);
     for (s, members) in slices.each() {
         let own = Own::slice(simd, records, slices, s);
-        let mut sum = [0.0; LANES];
-        for l in 0..LANES {
-            sum[l] = at_center * own.at.volume[l];
-        }
-        for &kind in [Kind::Fluid].iter().chain(bodies(model)) {
-            if kind != Kind::Fluid && !slices.has(s, kind) {
-                continue;
+        slots.clear();
+        let place = links.places(&own.i);
+        for link in links.of(s) {
+            let mut to = [0; LANES];
+            for l in 0..LANES {
+                to[l] = link.to(l) as u32;
             }
-            for near in slices.run(records, s, kind) {
-                let other = gather(simd, near);
-                let (_, r_sq) = wrap_lanes(simd, model, &own.at.x, &other.x);
-                let w = weights(kernel, inverse, &r_sq);
-                for l in 0..LANES {
-                    // the particle itself, and what fills a slot, has its part already
-                    let weight = if near.index[l] == own.i[l] { 0.0 } else { w[l] };
-                    sum[l] += other.volume[l] * weight;
-                }
-            }
+            slots.push(simd, model, &own, link.vectors(simd, around).map(|c| c.to_array()), to);
         }
+        // the particle itself, and what fills a slot, has its part already
+        let place = u32x16::load_array_ref(simd, &place);
+        for (r_sq, to) in slots.r_sq.iter_mut().zip(&slots.to) {
+            let itself = u32x16::load_array_ref(simd, &to.0).simd_eq(place);
+            itself.select(far, f32x16::load_array_ref(simd, &r_sq.0)).store_array(&mut r_sq.0);
+        }
+        let place = u32x16::load_array_ref(simd, &own.i);
+        for near in slices.run(records, s, Kind::Static) {
+            slots.push(simd, model, &own, of_walls(simd, near), [0; LANES]);
+            let itself = u32x16::load_array_ref(simd, near.index).simd_eq(place);
+            let r_sq = &mut slots.r_sq.last_mut().expect("pushed above").0;
+            itself.select(far, f32x16::load_array_ref(simd, r_sq)).store_array(r_sq);
+        }
+        weigh(kernel, model.inverse_support(), slots.flat().0);
+        let mut sum = at_center * f32x16::load_array_ref(simd, &own.at.volume);
+        for (w, volume) in slots.r_sq.iter().zip(&slots.volume) {
+            sum += f32x16::load_array_ref(simd, &volume.0) * f32x16::load_array_ref(simd, &w.0);
+        }
+        let sum = sum.to_array();
         for (l, k) in members.enumerate() {
             density[k] = model.factors.w * sum[l];
         }
     }
+}
+
+/// Fluids, and the kinds of bodies that take part in density and pressure.
+fn kinds(model: &Model) -> impl Iterator<Item = Kind> {
+    std::iter::once(Kind::Fluid).chain(bodies(model).iter().copied())
 }
 
 /// The kinds of bodies that take part in density and pressure.
@@ -304,91 +412,85 @@ pub fn bodies(model: &Model) -> &'static [Kind] {
     }
 }
 
-/// Links to the neighbours of one kind, and their sums.
+/// Links to the neighbours in `slots`, of which `along_d` is known, and their sums.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)] // one caller
-fn run<S: Simd, const FLUID: bool>(
+fn sums<S: Simd>(
     simd: S,
     input: &Input,
     slices: &Slices,
     s: usize,
-    own: &Own,
     rho: &Lanes,
-    kind: Kind,
+    slots: &Slots,
     links: &mut Links,
-    sums: &mut Sums,
-) {
+) -> Sums<S> {
     let Input { model, records, owner, gravity, .. } = *input;
-    let (inverse, factor) = (model.inverse_support(), model.factors.g);
-    let mut answer = [0.0; LANES];
-    for l in 0..LANES {
-        answer[l] = 1.0 / rho[l];
-    }
-    for near in slices.run(records, s, kind) {
-        let other = gather(simd, near);
-        let (d, r_sq) = wrap_lanes(simd, model, &own.at.x, &other.x);
-        if FLUID && model.fluids.len() > 1 {
-            for l in 0..LANES {
-                answer[l] = 1.0 / model.fluids[owner[near.index[l] as usize] as usize].density;
+    let zero = f32x16::splat(simd, 0.0);
+    let read = |lanes: &Lanes| f32x16::load_array_ref(simd, lanes);
+    let gravity = [gravity.x, gravity.y, gravity.z].map(|g| f32x16::splat(simd, g));
+    let own_rho = read(rho);
+    let mut answer = f32x16::splat(simd, 1.0) / own_rho;
+    let mut sums = Sums { fluid: [zero; 3], solid: [zero; 3], pull: [zero; 3], pairs: zero, spread: zero };
+    let mut slot = slots.d.iter().zip(&slots.r_sq).zip(&slots.to);
+    for kind in kinds(model) {
+        for (near, ((d, along_d), to)) in slices.run(records, s, kind).zip(&mut slot) {
+            let (along_d, mut e) = (read(&along_d.0), [zero; 3]);
+            for a in 0..3 {
+                e[a] = along_d * read(&d[a].0);
+            }
+            if kind == Kind::Fluid {
+                if model.fluids.len() > 1 {
+                    let rho = |l: usize| model.fluids[owner[near.index[l] as usize] as usize].density;
+                    answer = f32x16::from_fn(simd, |l| 1.0 / rho(l));
+                }
+                let e = links.push(simd, &to.0, e);
+                for a in 0..3 {
+                    sums.fluid[a] += e[a];
+                }
+                sums.pairs += answer * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+                sums.spread += read(&d[0].0) * e[0] + read(&d[1].0) * e[1] + read(&d[2].0) * e[2];
+                continue;
+            }
+            if kind == Kind::Rigid {
+                // counted twice, see `Nodes::all`; what pushes is not rounded: `press` does not round what bodies feel
+                links.push(simd, &to.0, [e[0] + e[0], e[1] + e[1], e[2] + e[2]]);
+            }
+            let pull = own_rho * (gravity[0] * read(&d[0].0) + gravity[1] * read(&d[1].0) + gravity[2] * read(&d[2].0));
+            for a in 0..3 {
+                sums.solid[a] += e[a];
+                sums.pull[a] += pull * e[a];
+            }
+            if kind == Kind::Rigid {
+                scripted(simd, input, near, d, e, rho, &mut sums.pull);
             }
         }
-        let mut e = each_kernel!(model.kernel.force(), K => sixteen(K, factor, inverse, &d, &r_sq, &other.volume));
-        if FLUID {
-            links.push(near.index, &mut e);
-        } else if kind == Kind::Rigid {
-            // counted twice, see `Nodes::all`; what pushes is not rounded: `press` does not round what bodies feel
-            links.push(near.index, &mut e.map(|e| e.map(|e| 2.0 * e)));
-        }
-        let sum = if FLUID { &mut sums.fluid } else { &mut sums.solid };
-        for l in 0..LANES {
-            sum[0][l] += e[0][l];
-            sum[1][l] += e[1][l];
-            sum[2][l] += e[2][l];
-        }
-        if FLUID {
-            for l in 0..LANES {
-                sums.pairs[l] += answer[l] * (e[0][l] * e[0][l] + e[1][l] * e[1][l] + e[2][l] * e[2][l]);
-                sums.spread[l] += d[0][l] * e[0][l] + d[1][l] * e[1][l] + d[2][l] * e[2][l];
-            }
-        }
-        if !FLUID {
-            for l in 0..LANES {
-                let pull = rho[l] * (gravity.x * d[0][l] + gravity.y * d[1][l] + gravity.z * d[2][l]);
-                sums.pull[0][l] += pull * e[0][l];
-                sums.pull[1][l] += pull * e[1][l];
-                sums.pull[2][l] += pull * e[2][l];
-            }
-        }
-        if kind == Kind::Rigid {
-            scripted(input, near, &d, &e, rho, sums);
-        }
     }
-}
-
-/// The vectors to sixteen neighbours, in one loop over the lanes.
-#[inline(always)]
-fn sixteen(kernel: Kernel, factor: f32, inverse: f32, d: &[Lanes; 3], r_sq: &Lanes, volume: &Lanes) -> [Lanes; 3] {
-    let mut e = [[0.0; LANES]; 3];
-    for l in 0..LANES {
-        let along_d = implicit::link(volume[l], factor * kernel.g(r_sq[l].sqrt() * inverse));
-        e[0][l] = along_d * d[0][l];
-        e[1][l] = along_d * d[1][l];
-        e[2][l] = along_d * d[2][l];
-    }
-    e
+    sums
 }
 
 /// The part of `pull` that the accelerations of scripted bodies have.
 #[inline(always)]
-fn scripted(input: &Input, near: Near, d: &[Lanes; 3], e: &[Lanes; 3], rho: &Lanes, sums: &mut Sums) {
+fn scripted<S: Simd>(
+    simd: S,
+    input: &Input,
+    near: Near,
+    d: &[Block; 3],
+    e: [f32x16<S>; 3],
+    rho: &Lanes,
+    to: &mut [f32x16<S>; 3],
+) {
+    let body = |l: usize| input.bodies.get(input.owner[near.index[l] as usize] as usize).filter(|b| b.is_static());
+    if (0..LANES).all(|l| body(l).is_none()) {
+        return;
+    }
+    let mut pull = [0.0; LANES];
     for l in 0..LANES {
-        let j = near.index[l] as usize;
-        let Some(body) = input.bodies.get(input.owner[j] as usize).filter(|b| b.is_static()) else { continue };
-        let a = rho[l] * acceleration(body, &input.records[j]);
-        let pull = a.x * d[0][l] + a.y * d[1][l] + a.z * d[2][l];
-        for axis in 0..3 {
-            sums.pull[axis][l] -= pull * e[axis][l];
-        }
+        let Some(body) = body(l) else { continue };
+        let a = rho[l] * acceleration(body, &input.records[near.index[l] as usize]);
+        pull[l] = a.x * d[0].0[l] + a.y * d[1].0[l] + a.z * d[2].0[l];
+    }
+    let pull = f32x16::load_array(simd, pull);
+    for a in 0..3 {
+        to[a] -= pull * e[a];
     }
 }
 
@@ -456,20 +558,28 @@ mod tests {
     use fearless_simd::{Level, dispatch};
 
     #[test]
-    fn counts_of_opposite_numbers_are_opposite() {
+    fn vectors_of_both_sides_stay_opposite() {
         let unit = 0.013;
+        let halo = vec![[0, 10, 0]];
+        let mut links = Links { unit, links: vec![Link::default(); 2], used: 0, ends: vec![2], halo };
         let numbers: Lanes = std::array::from_fn(|l| (l as f32 - 6.5) * 61.7);
-        let (mut plus, mut minus) = (numbers, numbers.map(|x| -x));
-        let (up, down) = (counted(&mut plus, unit, 1.0 / unit), counted(&mut minus, unit, 1.0 / unit));
-        let (up, down) = (up.map(|c| c as i16), down.map(|c| c as i16));
-        for l in 0..LANES {
-            assert_eq!(up[l], -down[l]);
-            assert_eq!(plus[l], -minus[l]);
-            let most = f32::from(i16::MAX) * unit;
-            let exact = numbers[l].clamp(-most, most);
-            assert!((plus[l] - exact).abs() <= 0.5001 * unit, "{exact} became {}", plus[l]);
-            assert_eq!(plus[l], unit * f32::from(up[l]));
-        }
+        dispatch!(Level::new(), simd => {
+            let x = f32x16::load_array(simd, numbers);
+            let zero = f32x16::splat(simd, 0.0);
+            let plus = links.push(simd, &[0; LANES], [x; 3])[1].to_array();
+            let minus = links.push(simd, &[0; LANES], [zero - x; 3])[1].to_array();
+            let [up, down] = [0, 1].map(|k| links.of(0)[k].e(simd).map(|e| e.to_array()));
+            for l in 0..LANES {
+                assert_eq!(plus[l], -minus[l]);
+                let most = f32::from(i16::MAX) * unit;
+                let exact = numbers[l].clamp(-most, most);
+                assert!((plus[l] - exact).abs() <= 0.5001 * unit, "{exact} became {}", plus[l]);
+                for a in 0..3 {
+                    assert_eq!(up[a][l], -down[a][l]);
+                    assert_eq!(plus[l], unit * up[a][l]);
+                }
+            }
+        });
     }
 
     /// What is linked is found again: vectors as they were rounded, values of the neighbours named.
@@ -478,15 +588,16 @@ mod tests {
         let halo = vec![[40, 90, 40], [200, 230, 150], [1000, 1100, 920]];
         let mut links = Links { unit: 0.5, links: vec![Link::default()], used: 0, ends: vec![1], halo: halo.clone() };
         let index: [u32; LANES] = std::array::from_fn(|l| [45, 89, 200, 229, 1000, 1099][l % 6]);
-        let mut e: [Lanes; 3] = std::array::from_fn(|a| std::array::from_fn(|l| (l as f32 - 7.3) * (a as f32 - 0.9)));
-        links.push(&index, &mut e);
+        let e: [Lanes; 3] = std::array::from_fn(|a| std::array::from_fn(|l| (l as f32 - 7.3) * (a as f32 - 0.9)));
         let values: Vec<f32> = (0..2000).map(|i| i as f32).collect();
         let mut table = Table::default();
         let vectors: Vec<[f32; 4]> = values.iter().map(|i| [*i, 2.0 * i, 3.0 * i, 0.0]).collect();
-        let link = links.of(0)[0];
         dispatch!(Level::new(), simd => {
+            let to = links.places(&index);
+            let e = links.push(simd, &to, e.map(|e| f32x16::load_array(simd, e))).map(|e| e.to_array());
+            let link = links.of(0)[0];
             let one = link.numbers(simd, table.numbers(&links, &values)).to_array();
-            let [x, y, z] = link.vectors(simd, table.vectors(&links, &vectors)).map(|c| c.to_array());
+            let [x, y, z, _] = link.vectors(simd, table.vectors(&links, &vectors)).map(|c| c.to_array());
             let [e_x, e_y, e_z] = link.e(simd).map(|c| c.to_array());
             for l in 0..LANES {
                 let i = index[l] as f32;

@@ -68,12 +68,14 @@ pub struct NeighbourChunk {
 pub struct Places {
     /// Positions (m).
     pub x: [Vec<f32>; 3],
+    /// Volumes of bodies' particles (m^3), fewer bytes apart than in records.
+    pub volume: Vec<f32>,
 }
 
 impl Places {
     /// Places for `n` particles.
     pub fn new(n: usize) -> Self {
-        Self { x: std::array::from_fn(|_| vec![0.0; n + LANES]) }
+        Self { x: std::array::from_fn(|_| vec![0.0; n + LANES]), volume: vec![0.0; n] }
     }
 }
 

@@ -22,6 +22,7 @@ pub const SCENES: &[Builtin] = &[
     Builtin { name: "bench-bricks", text: include_str!("../../../../scenes/bench-bricks.toml") },
     Builtin { name: "bench-balls", text: include_str!("../../../../scenes/bench-balls.toml") },
     Builtin { name: "bench-flock", text: include_str!("../../../../scenes/bench-flock.toml") },
+    Builtin { name: "bench-floats", text: include_str!("../../../../scenes/bench-floats.toml") },
     Builtin { name: "dam-break", text: include_str!("../../../../scenes/dam-break.toml") },
     Builtin { name: "cup", text: include_str!("../../../../scenes/cup.toml") },
     Builtin { name: "school", text: include_str!("../../../../scenes/school.toml") },

@@ -155,8 +155,7 @@ pub struct Solver {
     /// How pressure is found.
     #[serde(default)]
     pub pressure: Pressure,
-    /// Mean compression, as a fraction of the rest density, at which the iterations of implicit pressure end (E9). PBF meets one above
-    /// 0.003 by a budget of iterations.
+    /// Mean compression, as a fraction of the rest density, at which the iterations of implicit pressure end (E9); with PBF 0.005 at most.
     #[serde(default = "d::tolerance")]
     pub tolerance: f64,
     /// The same for the compression that velocities bring in a step (E9, DFSPH).

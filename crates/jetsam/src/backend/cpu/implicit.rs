@@ -112,7 +112,10 @@ impl Cpu {
         let level = self.level;
         let chunks = links.par_iter_mut().zip(nodes.par_chunks_mut(CHUNK / LANES)).zip(&self.slices);
         chunks.for_each(|((links, nodes), slices)| {
-            dispatch!(level, simd => links::chunk(simd, input, slices, links, nodes));
+            with_scratch(|scratch| {
+                let table = &mut scratch.places;
+                dispatch!(level, simd => links::chunk(simd, table, input, slices, links, nodes));
+            });
         });
     }
 
@@ -121,8 +124,12 @@ impl Cpu {
         let (p, level) = (&mut self.state.particles, self.level);
         let n = p.count[Kind::Fluid as usize];
         let (records, density) = (&p.record[..], &mut p.density[..n]);
-        let chunks = density.par_chunks_mut(CHUNK).zip(&self.slices).map(|(density, slices)| {
-            dispatch!(level, simd => links::densities(simd, model, records, slices, density));
+        let links = self.slices.par_iter().zip(&self.implicit.links);
+        let chunks = density.par_chunks_mut(CHUNK).zip(links).map(|(density, (slices, links))| {
+            with_scratch(|scratch| {
+                let table = &mut scratch.places;
+                dispatch!(level, simd => links::densities(simd, table, model, records, slices, links, density));
+            });
             density.iter().map(|d| f64::from((d - 1.0).max(0.0))).sum()
         });
         chunks.collect::<Vec<f64>>().iter().sum::<f64>() / n as f64
@@ -295,7 +302,7 @@ impl Cpu {
         self.link(model, gravity);
         // what all but fluids' pressures and contacts make of bodies
         self.flow_of_bodies(advance);
-        self.implicit.divergence = self.solve(model, advance, Aim::Velocities, model.budget());
+        self.implicit.divergence = self.solve(model, advance, Aim::Velocities, model.solver.iterations);
         if links::bodies(model).contains(&Kind::Static) {
             self.press(model, Kind::Static, gravity);
         }
@@ -330,7 +337,7 @@ impl Cpu {
         };
         let warm: Vec<f32> = (0..hold.len()).into_par_iter().with_min_len(CHUNK).map(begun).collect();
         self.prepare(model, |i| warm[i]);
-        self.implicit.pressure = self.solve(model, advance, Aim::Places, model.budget());
+        self.implicit.pressure = self.solve(model, advance, Aim::Places, model.solver.iterations);
         let Implicit { places, share, hold, .. } = &mut self.implicit;
         places.clear();
         places.extend_from_slice(&share[..hold.len()]);
@@ -454,14 +461,14 @@ impl Cpu {
             }
             if turn > 0 {
                 said.residual = self.compressed(model);
-                let budget = f64::from(said.iterations) >= model.budget();
+                let budget = f64::from(said.iterations) >= model.solver.iterations;
                 if said.residual <= model.tolerance() || budget || turn == TURNS {
                     break;
                 }
                 self.prepare(model, |_| 0.0);
             }
             self.link(model, gravity);
-            let left = model.budget() - f64::from(said.iterations);
+            let left = model.solver.iterations - f64::from(said.iterations);
             said.iterations += self.solve(model, advance, Aim::Both, left).iterations;
             if links::bodies(model).contains(&Kind::Static) {
                 self.press(model, Kind::Static, gravity);

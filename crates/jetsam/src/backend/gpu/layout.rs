@@ -370,7 +370,12 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         tune: [f.laplacian, model.softening(), s.xsph as f32, s.shifting as f32],
         contact: [(rate * rate) as f32, (s.vorticity * model.spacing) as f32, 0.0, model.hold_limit()],
         step: [steps[0] as f32, steps[1] as f32, least(&others), s.dt.unwrap_or(0.0) as f32],
-        rounds: [model.tolerance() as f32, s.divergence_tolerance as f32, model.budget() as f32, least(&contact)],
+        rounds: [
+            model.tolerance() as f32,
+            s.divergence_tolerance as f32,
+            model.solver.iterations as f32,
+            least(&contact),
+        ],
         relax: [
             f.relaxation,
             if s.pressure == Pressure::Pbf { model.compliance() as f32 } else { 0.0 },

@@ -103,7 +103,7 @@ impl OnGpu {
 
     /// Rounds to queue from now on. Where a solve stands still for want of rounds it is told to go on: returns its number.
     fn resume(&mut self, model: &Model, clock: Clock) -> Option<usize> {
-        let budget = model.budget().ceil() as usize;
+        let budget = model.solver.iterations.ceil() as usize;
         let stands = (clock.halted as usize).checked_sub(1);
         for (number, rounds) in self.rounds.iter_mut().enumerate() {
             let needed = clock.rounds[number] as usize;
