@@ -142,6 +142,29 @@ fn run_writes_what_the_contract_says() {
     }
 }
 
+/// The pressure in a file is that with which the solver pushes: in water at rest rho g times the depth, on average half of that at the bottom.
+#[test]
+fn files_of_particles_hold_the_pressure_of_the_solver() {
+    let dir = folder("pressures");
+    for solver in ["wcsph", "dfsph"] {
+        let text = format!(
+            "[world]\ndimensions = 2\n[domain]\nmin = [0, 0, 0]\nmax = [0.5, 0, 0.4]\n[resolution]\nspacing = 0.02\n\
+             [solver]\npressure = \"{solver}\"\nartificial_viscosity = 0.5\nsettle = 0.5\n[run]\nseconds = 0.4\nframes_per_second = 2.5\n\
+             [[fluid]]\nshape = {{ box = {{ min = [0, 0, 0], max = [0.5, 0, 0.3] }} }}\n"
+        );
+        good(&dir, &["run", &scene(&dir, &text), "--save", "ply", "--out", solver]);
+        let bytes = std::fs::read(dir.join(solver).join("frame_00001.ply")).unwrap();
+        let end = b"end_header\n";
+        let begin = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+        // eight numbers, a byte, two indices
+        let rows = bytes[begin..].chunks_exact(8 * 4 + 1 + 2 * 4);
+        assert_eq!(rows.len(), 25 * 15);
+        let mean = rows.clone().map(|row| f32::from_le_bytes(row[28..32].try_into().unwrap())).sum::<f32>() / 375.0;
+        let expected = 1000.0 * 9.81 * 0.3 / 2.0;
+        assert!((mean / expected - 1.0).abs() < 0.1, "{solver}: {mean} Pa, {expected} expected");
+    }
+}
+
 #[test]
 fn a_run_is_quiet_in_a_pipe_and_repeats_to_the_last_bit() {
     let dir = folder("quiet");

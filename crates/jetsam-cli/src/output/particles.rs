@@ -1,6 +1,7 @@
 //! One file of particles a frame: what is written, whatever the format.
 
 use super::{Writer, at, create, frame_path};
+use jetsam::interact::pressure::of_particle;
 use jetsam::state::{Kind, State};
 use jetsam::{FrameStats, World};
 use std::fs::File;
@@ -62,9 +63,8 @@ fn rows(world: &World) -> Vec<Row> {
             let r = &p.record[i];
             let (mut density, mut pressure) = (0.0, 0.0);
             if kind == Kind::Fluid {
-                let d = p.density[i];
-                density = d * world.model().fluids[p.owner[i] as usize].density;
-                pressure = jetsam::interact::pressure::pressure(world.model(), p.owner[i], d);
+                density = p.density[i] * world.model().fluids[p.owner[i] as usize].density;
+                pressure = of_particle(world.model(), p, i);
             }
             let ([x, y, z], [vx, vy, vz]) = (r.x, r.v);
             Row { numbers: [x, y, z, vx, vy, vz, density, pressure], kind: kind as u8, owner: p.owner[i], id: p.id[i] }
