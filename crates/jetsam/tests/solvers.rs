@@ -57,6 +57,27 @@ fn a_tank_at_rest_weighs_what_its_water_weighs() {
     }
 }
 
+/// Places that are corrected to one part in ten thousand come to rest: what a turn of PBF has pushed too far the next takes back, and pairs
+/// with walls bear their part of the weight once. Otherwise water climbs along the walls.
+#[test]
+fn a_tank_under_pbf_comes_to_rest() {
+    let mut w = world(&tank("pbf", 0.3, 0.0125, "").replace("\"pbf\"", "\"pbf\"\ntolerance = 1e-4"));
+    w.advance(2.75, |_, _| true);
+    let mut fastest = 0.0f64;
+    w.advance(3.0, |w, _| {
+        fastest = fastest.max(w.ledger().speed);
+        true
+    });
+    // what a tank of SPH particles without density diffusion comes to
+    let bar = 1e-2 * (9.81f64 * 0.3).sqrt();
+    assert!(fastest < bar, "{fastest} m/s at rest, bar {bar}");
+    let p = &w.state().particles;
+    let inside = p.record[p.segment(Kind::Fluid)].iter().filter(|r| (0.025..0.275).contains(&r.x[2]));
+    let errors: Vec<f64> = inside.map(|r| (f64::from(r.share) - 9810.0 * (0.3 - f64::from(r.x[2]))).powi(2)).collect();
+    let l2 = (errors.iter().sum::<f64>() / errors.len() as f64).sqrt() / 2943.0;
+    assert!(l2 < 0.02, "the pressure of one step is off by {l2} of that at the floor");
+}
+
 /// A column ten spacings wide and a hundred deep: DFSPH's rounds have a long way to the surface, past walls on both sides.
 #[test]
 fn a_deep_column_stands() {

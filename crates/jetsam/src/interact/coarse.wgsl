@@ -124,7 +124,7 @@ fn coarse_occupied(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups)
 
 // 1 for a particle whose share takes part, else 0. Errors so much smaller than their mean may be those of rounding.
 const NOISE: f32 = 0.01;
-fn takes_part(i: u32) -> f32 { return select(0.0, 1.0, work[i].x > 0.0 || remains[i] > NOISE * solve.residual); }
+fn takes_part(i: u32) -> f32 { return select(0.0, 1.0, work[i].w + work[i].x > 0.0 || remains[i] > NOISE * solve.residual); }
 
 // Accelerations of fluids by shares that are 1; w: how much of a gradient the sum over fluids finds, 1 amid them.
 @compute @workgroup_size(128)
@@ -524,7 +524,7 @@ fn coarse_add(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
     let part = corner_parts(way, c);
     between += part.x * part.y * part.z * lattice[SHARE * count + node_at(t, at, c)];
   }
-  let now = max(own.w + takes_part(i) * between, 0.0);
+  let now = max(own.w + takes_part(i) * between, -work[i].w);
   work[i].x += now - own.w;   // what rounds have gone is theirs alone
   spot[i].w = now;
 }

@@ -119,6 +119,8 @@ pub struct Shares<'a> {
     pub hold: &'a mut [f32],
     /// Those that pushed in the round before.
     pub before: &'a mut [f32],
+    /// What pushed before they did, below the opposite of which none may fall: no sum is negative.
+    pub base: &'a [f32],
     /// Receives what the shares that pushed have left, in compression; of particles without pressure only the excess.
     pub left: &'a mut [f32],
 }
@@ -138,26 +140,26 @@ pub struct Said {
 /// holds the shares that pushed and receives those to push with next, `before` those of the round before and those that pushed.
 #[inline(always)]
 pub fn relax<S: Simd>(simd: S, round: Round, nodes: &[Nodes], error: &[f32], rate: &[f32], shares: Shares) -> Said {
-    let Shares { share, hold, before, left: rest } = shares;
+    let Shares { share, hold, before, base, left: rest } = shares;
     let (kept, stride) = (implicit::carried(round.number), implicit::stride(round.number));
     let mut sums = [[0.0; LANES]; 3];
     for (s, nodes) in nodes.iter().enumerate() {
         let at = LANES * s;
         let read = |from: &[f32]| load(simd, from, at).to_array();
-        let (error, rate, own, last) = (read(error), read(rate), read(share), read(before));
+        let (error, rate, own, last, base) = (read(error), read(rate), read(share), read(before), read(base));
         let (mut now, mut held) = ([0.0; LANES], [0.0; LANES]);
         let (mut signed, mut against) = ([0.0; LANES], [0.0; LANES]);
         for l in 0..LANES {
             let compliance = round.compliance * nodes.inverse_rho[l];
-            let left = error[l] + round.scale * rate[l] - compliance * own[l];
+            let left = error[l] + round.scale * rate[l] - compliance * (base[l] + own[l]);
             let answer = round.scale * nodes.response[l] + compliance;
             let by = round.omega / answer;
             // what the share should still change by, in compression: of particles without pressure only the excess counts
-            let plain = implicit::relaxed(own[l], left, by, 0.0);
+            let plain = implicit::relaxed(own[l], left, by, 0.0, -base[l]);
             signed[l] = (plain - own[l]) * answer / round.omega;
-            now[l] = implicit::relaxed(own[l], left, stride * by, kept * (own[l] - last[l]));
+            now[l] = implicit::relaxed(own[l], left, stride * by, kept * (own[l] - last[l]), -base[l]);
             against[l] = left * (own[l] - now[l]);
-            held[l] = implicit::hold(now[l], round.limit);
+            held[l] = implicit::hold_more(base[l], now[l], round.limit);
         }
         let members = LANES.min(share.len() - at);
         for l in 0..members {

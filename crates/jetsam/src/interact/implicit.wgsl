@@ -171,7 +171,7 @@ fn accelerate(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
     total += other.w * link_to(d, r_sq, m.per_cell.w);
   }
   let node = nodes[i];
-  total += own.w * node.all.xyz + hold(own.w, m.contact.w) * node.pull.xyz;
+  total += own.w * node.all.xyz + hold_more(work[i].w, own.w, m.contact.w) * node.pull.xyz;
   flow[i] = vec4<f32>(-node.pull.w * total, 0.0);
 }
 
@@ -253,12 +253,12 @@ fn relax_one(i: u32) -> vec3<f32> {
   let share = spot[i].w;
   let scale = clock.dt * clock.dt;
   let compliance = m.relax.y * nodes[i].pull.w;
-  let left = w.y + scale * rate - compliance * share;
+  let left = w.y + scale * rate - compliance * (w.w + share);
   let by = solve.omega / (scale * nodes[i].all.w + compliance);
   // what the share should still change by, in compression: of particles without pressure only the excess counts
-  let plain = relaxed(share, left, by, 0.0);
+  let plain = relaxed(share, left, by, 0.0, -w.w);
   let signed = (plain - share) / by;
-  let now = relaxed(share, left, stride(solve.since) * by, carried(solve.since) * (share - w.x));
+  let now = relaxed(share, left, stride(solve.since) * by, carried(solve.since) * (share - w.x), -w.w);
   work[i] = vec4<f32>(share, w.y, rate, w.w);
   spot[i].w = now;
   if (COARSE) { remains[i] = signed; }
@@ -326,9 +326,7 @@ fn finish(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<
   // where the shares that pushed are good enough they stay
   let share = select(spot[i].w, w.x, solve.small == 1u);
   spot[i].w = share;
-  var sum = w.w;
-  if (PBF) { sum = select(w.w, 0.0, solve.turn == 1u) + share; }
-  work[i] = vec4<f32>(share, w.y + clock.dt * clock.dt * w.z, 0.0, sum);
+  work[i] = vec4<f32>(share, w.y + clock.dt * clock.dt * w.z, 0.0, w.w);
 }
 
 // DFSPH: velocities that do not compress.
@@ -363,6 +361,7 @@ fn shift_fluid(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
   let dv = clock.dt * flow[i].xyz;
   let r = records[i];
   records[i] = Record(vec4<f32>(home_all(r.x.xyz + clock.dt * dv), r.x.w), vec4<f32>(r.v.xyz + dv, r.v.w));
+  work[i].w += work[i].x;
 }
 @compute @workgroup_size(64)
 fn shift_bodies(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {

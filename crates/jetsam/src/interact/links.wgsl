@@ -80,7 +80,7 @@ fn seat(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u3
     var share = records[i].v.w;
     if (PBF) { share *= select(recalled(clock.dt_before, clock.dt), 0.0, solve.turn > 1u); }
     spot[i] = vec4<f32>(records[i].x.xyz, share);
-    work[i] = vec4<f32>(share, push[i].w - 1.0, 0.0, work[i].w);
+    work[i] = vec4<f32>(share, push[i].w - 1.0, 0.0, select(0.0, work[i].w, solve.turn > 1u));
     flow[i] = vec4<f32>(records[i].v.xyz, 0.0);
   } else if (i >= m.count.x && i < rigid_end()) {
     spot[i] = records[i].x;
@@ -103,7 +103,8 @@ fn squeeze(i: u32) -> vec3<f32> {
     if (FLUIDS > 1u) { rho = m.fluids[info[near.at].y].density; }
     let G = m.kernel.y * force_g(sqrt(r_sq) * m.origin.w);
     // as the fluid particle sees it: from it to this one is -d
-    let share = share_at_boundary(other.w, hold(other.w, m.contact.w), -rho * dot(pull, d));
+    let held = hold_more(work[near.at].w, other.w, m.contact.w);
+    let share = share_at_boundary(other.w, held, -rho * dot(pull, d));
     total += (own.w * m.per_cell.w * share * G) * d;
   }
   return total;

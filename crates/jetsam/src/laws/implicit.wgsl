@@ -15,10 +15,10 @@ fn response(all_sq: f32, inverse_rho: f32, pairs: f32, least: f32) -> f32 {
   return max(all_sq * inverse_rho + pairs, least * inverse_rho);
 }
 
-// A share after one more round: never negative, as fluids bear no tension. error = what D is above 1, or its rate above 0; went =
-// what the last round changes it by still.
-fn relaxed(share: f32, error: f32, rate: f32, went: f32) -> f32 {
-  return max(share + error * rate + went, 0.0);
+// A share after one more round. error = what D is above 1, or its rate above 0; went = what the last round changes it by still; least:
+// fluids bear no tension, so 0, or the opposite of what the particle has been pushed with before.
+fn relaxed(share: f32, error: f32, rate: f32, went: f32, least: f32) -> f32 {
+  return max(share + error * rate + went, least);
 }
 
 // Of round k = 0, 1, 2, ..: the part of the last change that is kept, and the factor of Jacobi's step. Residuals then are Chebyshev
@@ -48,6 +48,11 @@ fn begun(before: f32, response: f32, dt: f32) -> f32 {
 // fades out with p_i, so that no pair pulls: factor of the second term in the sum of both shares.
 fn hold(share: f32, limit: f32) -> f32 {
   return min(2.0 * share / limit, 1.0);
+}
+
+// What more of it a share brings to one that has pushed already.
+fn hold_more(base: f32, share: f32, limit: f32) -> f32 {
+  return hold(base + share, limit) - hold(base, limit);
 }
 
 // Sum of the shares of a fluid particle and a body's.

@@ -5,7 +5,7 @@ use super::{CHUNK, Cpu, GONE};
 use crate::integrate::Advance;
 use crate::interact::coarse::{Coarse, Felt, Input};
 use crate::interact::implicit::Round;
-use crate::laws::implicit::hold as hold_of;
+use crate::laws::implicit::hold_more;
 use crate::model::Model;
 use crate::state::Kind;
 use fearless_simd::dispatch;
@@ -32,20 +32,20 @@ impl Cpu {
     pub(super) fn smooth(&mut self, model: &Model, advance: Advance, round: Round, aim: Aim, residual: f64) {
         self.lay(model, advance, round, aim, residual);
         let (level, p) = (self.level, &self.state.particles);
-        let Implicit { coarse, share, hold, before, left, .. } = &mut self.implicit;
+        let Implicit { coarse, share, hold, before, base, left, .. } = &mut self.implicit;
         let Level { coarse, active, between, .. } = coarse;
         coarse.solve(level, &self.cells[Kind::Fluid as usize], &p.record, left);
         let coarse = &*coarse;
         let shares = share.par_chunks_mut(CHUNK).zip(hold.par_chunks_mut(CHUNK)).zip(before.par_chunks_mut(CHUNK));
-        let read = p.record.par_chunks(CHUNK).zip(active.par_chunks(CHUNK));
-        between.par_chunks_mut(CHUNK).zip(read).zip(shares).for_each(|((between, (record, active)), all)| {
+        let read = p.record.par_chunks(CHUNK).zip(active.par_chunks(CHUNK)).zip(base.par_chunks(CHUNK));
+        between.par_chunks_mut(CHUNK).zip(read).zip(shares).for_each(|((between, ((record, active), base)), all)| {
             dispatch!(level, simd => coarse.interpolate(simd, record, between));
             let ((share, hold), before) = all;
             for i in 0..between.len() {
-                let now = (share[i] + active[i] * between[i]).max(0.0);
+                let now = (share[i] + active[i] * between[i]).max(-base[i]);
                 before[i] += now - share[i]; // what rounds have gone is theirs alone
                 share[i] = now;
-                hold[i] = hold_of(now, round.limit);
+                hold[i] = hold_more(base[i], now, round.limit);
             }
         });
     }
@@ -54,15 +54,15 @@ impl Cpu {
     fn lay(&mut self, model: &Model, advance: Advance, round: Round, aim: Aim, residual: f64) {
         let noise = NOISE * residual as f32;
         let n = self.implicit.hold.len();
-        let Implicit { coarse: Level { active, none, between, .. }, share, before, left, .. } = &mut self.implicit;
+        let Implicit { coarse: Level { active, none, between, .. }, share, before, base, left, .. } =
+            &mut self.implicit;
         active.clear();
         active.resize(share.len(), 0.0);
         none.resize(n, 0.0);
         between.resize(n, 0.0);
-        let takes_part = |(before, left): (&f32, &f32)| if *before > 0.0 || *left > noise { 1.0 } else { 0.0 };
-        active[..n].par_iter_mut().zip(before).zip(left).with_min_len(CHUNK).for_each(|((active, before), left)| {
-            *active = takes_part((before, left));
-        });
+        let takes_part = |pushed: f32, left: f32| if pushed > 0.0 || left > noise { 1.0 } else { 0.0 };
+        let all = active[..n].par_iter_mut().zip(before).zip(base).zip(left).with_min_len(CHUNK);
+        all.for_each(|(((active, before), base), left)| *active = takes_part(*base + *before, *left));
         self.borrow_shares();
         self.push_fluids();
         let bodies = self.answers(model, aim);

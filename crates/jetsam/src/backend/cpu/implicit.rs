@@ -11,7 +11,7 @@ use crate::interact::implicit::{self, Round, Said, Shares};
 use crate::interact::lanes::LANES;
 use crate::interact::links::{self, Links, Nodes};
 use crate::interact::neighbours::with_scratch;
-use crate::laws::implicit::{begun, recalled};
+use crate::laws::implicit::{begun, hold_more, recalled};
 use crate::ledger::Solve;
 use crate::model::Model;
 use crate::scene::Wall;
@@ -42,6 +42,8 @@ pub(super) struct Implicit {
     pub(super) share: Vec<f32>,
     pub(super) hold: Vec<f32>,
     pub(super) before: Vec<f32>,
+    /// Shares of PBF's turns before, whose pushes are in the places already; else 0.
+    pub(super) base: Vec<f32>,
     /// What the shares of a round have left (compression), for the coarse level.
     pub(super) left: Vec<f32>,
     pub(super) coarse: Level,
@@ -242,19 +244,23 @@ impl Cpu {
     /// One round: the rates of what `flow` holds, and all shares relaxed by them.
     fn relax(&mut self, round: Round) -> Said {
         let level = self.level;
-        let Implicit { links, nodes, flow, share, hold, before, left, error, rate, said, .. } = &mut self.implicit;
+        let Implicit { links, nodes, flow, share, hold, before, left, base, error, rate, said, .. } =
+            &mut self.implicit;
         said.resize(links.len(), Said::default());
         let flow = &flow[..];
         let shares = share.par_chunks_mut(CHUNK).zip(hold.par_chunks_mut(CHUNK));
         let shares = shares.zip(before.par_chunks_mut(CHUNK).zip(left.par_chunks_mut(CHUNK)));
-        let read = nodes.par_chunks(CHUNK / LANES).zip(error.par_chunks(CHUNK)).zip(links.par_iter());
+        let read = nodes
+            .par_chunks(CHUNK / LANES)
+            .zip(error.par_chunks(CHUNK).zip(base.par_chunks(CHUNK)))
+            .zip(links.par_iter());
         let all = said.par_iter_mut().zip(rate.par_chunks_mut(CHUNK)).zip(shares.zip(read)).enumerate();
-        all.for_each(|(c, ((said, rate), (((share, hold), (before, left)), ((nodes, error), links))))| {
+        all.for_each(|(c, ((said, rate), (((share, hold), (before, left)), ((nodes, (error, base)), links))))| {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => {
                     implicit::rates(simd, table, links, nodes, flow, c * CHUNK, rate);
-                    *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, before, left });
+                    *said = implicit::relax(simd, round, nodes, error, rate, Shares { share, hold, before, left, base });
                 });
             });
         });
@@ -276,6 +282,8 @@ impl Cpu {
         s.hold.resize(n, 0.0);
         s.before.resize(n, 0.0);
         s.left.resize(n, 0.0);
+        s.base.clear();
+        s.base.resize(n, 0.0);
         s.error.resize(n, 0.0);
         s.rate.resize(n, 0.0);
         s.flow.resize(total, [0.0; 4]);
@@ -397,13 +405,13 @@ impl Cpu {
                 self.smooth(model, advance, round, aim, said.residual);
             }
         };
-        let Implicit { share, hold, before, error, rate, .. } = &mut self.implicit;
-        let all = share.par_iter_mut().zip(hold).zip(before).with_min_len(CHUNK);
-        all.zip(error).zip(rate).for_each(|((((share, hold), before), error), rate)| {
+        let Implicit { share, hold, before, base, error, rate, .. } = &mut self.implicit;
+        let all = share.par_iter_mut().zip(hold).zip(before.par_iter().zip(base)).with_min_len(CHUNK);
+        all.zip(error).zip(rate).for_each(|((((share, hold), (before, base)), error), rate)| {
             // where the shares that pushed are good enough they stay
             if small {
                 *share = *before;
-                *hold = crate::laws::implicit::hold(*before, limit);
+                *hold = hold_more(*base, *before, limit);
             }
             *error += scale * *rate;
         });
@@ -449,9 +457,9 @@ impl Cpu {
     pub(super) fn correct(&mut self, model: &Model, advance: Advance) {
         let p = &self.state.particles;
         let n = p.count[Kind::Fluid as usize];
-        let mut sum: Vec<f32> = p.record[..n].par_iter().map(|r| r.share).collect();
+        let warm: Vec<f32> = p.record[..n].par_iter().map(|r| r.share).collect();
         let kept = recalled(advance.dt_before as f32, advance.dt as f32);
-        self.prepare(model, |i| kept * sum[i]);
+        self.prepare(model, |i| kept * warm[i]);
         let gravity = model.gravity_at(advance.end());
         let mut said = Solve::default();
         let mut total = vec![[DVec3::ZERO; 2]; self.state.bodies.body.len()];
@@ -465,7 +473,7 @@ impl Cpu {
                 if said.residual <= model.tolerance() || budget || turn == TURNS {
                     break;
                 }
-                self.prepare(model, |_| 0.0);
+                self.begin_again();
             }
             self.link(model, gravity);
             let left = model.solver.iterations - f64::from(said.iterations);
@@ -474,14 +482,23 @@ impl Cpu {
                 self.press(model, Kind::Static, gravity);
             }
             self.shift(model, advance, &mut total);
-            let shares = sum.par_iter_mut().zip(&self.implicit.share).with_min_len(CHUNK);
-            shares.for_each(|(sum, share)| *sum = if turn == 0 { *share } else { *sum + *share });
         }
         self.ledger.put_back += self.keep_inside(model, DEEP);
         self.implicit.pressure = said;
         self.implicit.added = total;
+        let Implicit { base, share, .. } = &self.implicit;
         let records = self.state.particles.record[..n].par_iter_mut().with_min_len(CHUNK);
-        records.zip(&sum).for_each(|(record, share)| record.share = *share);
+        records.zip(base).zip(share).for_each(|((record, base), share)| record.share = base + share);
+    }
+
+    /// A turn of PBF after the first: its shares are what those so far are changed by.
+    fn begin_again(&mut self) {
+        let Implicit { base, share, hold, before, .. } = &mut self.implicit;
+        let all = base.par_iter_mut().zip(share).zip(hold.par_iter_mut().zip(before)).with_min_len(CHUNK);
+        all.for_each(|((base, share), (hold, before))| {
+            *base += *share;
+            (*share, *hold, *before) = (0.0, 0.0, 0.0);
+        });
     }
 
     /// Moves particles by this round's accelerations, and bodies by its thrusts, which are added to `total`.

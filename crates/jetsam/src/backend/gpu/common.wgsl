@@ -215,7 +215,7 @@ struct Sums {
 @group(0) @binding(35) var<storage, read_write> spot: array<vec4<f32>>;     // sorted: place; w: share of fluids, volume of bodies' particles
 @group(0) @binding(36) var<storage, read_write> flow: array<vec4<f32>>;     // sorted: accelerations by shares, or velocities
 @group(0) @binding(37) var<storage, read_write> nodes: array<Node>;         // fluid
-@group(0) @binding(38) var<storage, read_write> work: array<vec4<f32>>;     // fluid: share found, error, rate, sum of shares over turns
+@group(0) @binding(38) var<storage, read_write> work: array<vec4<f32>>;     // fluid: share that pushed, error, rate, sum of the shares of turns before
 @group(0) @binding(39) var<storage, read_write> said: array<vec4<f32>>;     // by workgroups of 128 fluid particles
 @group(0) @binding(40) var<storage, read_write> squeezed: array<vec4<f32>>; // force of shares on bodies' particles (N), as touch
 @group(0) @binding(41) var<storage, read_write> joints: array<Joint>;
