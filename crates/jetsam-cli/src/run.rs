@@ -1,8 +1,8 @@
 //! `jetsam run`: a scene from its beginning to its end, frame by frame.
 
 use crate::args::Run;
-use crate::output::Outputs;
 use crate::output::pictures::Artist;
+use crate::output::{Outputs, frames_from};
 use crate::terminal::{progress, say, seconds, table};
 use crate::{Outcome, terminal};
 use jetsam::{Recorder, Scene, Summary, Trouble, World};
@@ -30,7 +30,7 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     let times = Frames::of(&scene, args);
     let bar = progress(times.count, &name_of(&input.scene).to_string_lossy());
     let mut recorder = Recorder::default();
-    let mut trouble = None;
+    let (mut trouble, mut next) = (None, 1);
     outputs.write(&world, &recorder.frame(&world, Duration::ZERO))?;
     for frame in 1..=times.count {
         let start = Instant::now();
@@ -45,6 +45,7 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
         }
         let stats = recorder.frame(&world, start.elapsed());
         outputs.write(&world, &stats)?;
+        next = frame + 1;
         bar.set_message(format!("real-time factor {:.3}", stats.real_time_factor));
         bar.inc(1);
         if trouble.is_some() {
@@ -54,6 +55,10 @@ pub fn run(args: &Run) -> miette::Result<Outcome> {
     bar.finish_and_clear();
     outputs.finish()?;
     let summary = recorder.summary(&world);
+    let old = frames_from(&folder, next);
+    if old > 0 {
+        say(&format!("note: {old} files from frame_{next:05} on are of an earlier run into {}", folder.display()));
+    }
     let drawn = args.save.iter().any(|kind| kind.is_picture());
     say(&describe(&summary, &folder, drawn));
     if let Some(fault) = world.fault() {

@@ -165,6 +165,24 @@ fn files_of_particles_hold_the_pressure_of_the_solver() {
     }
 }
 
+/// A shorter run into the folder of a longer one: pictures of both would make one video.
+#[test]
+fn frames_of_an_earlier_run_are_told_of() {
+    let dir = folder("earlier");
+    let water = "[world]\ndimensions = 2\n[domain]\nmin = [0, 0, 0]\nmax = [0.4, 0, 0.4]\n[resolution]\nspacing = 0.05\n\
+                 [[fluid]]\nshape = { box = { min = [0, 0, 0], max = [0.2, 0, 0.2] } }\n";
+    let scene = scene(&dir, water);
+    let run = |frames| {
+        let out = jetsam(&dir, &["run", &scene, "--frames", frames, "--save", "ply,vtk", "--out", "o"]);
+        assert_eq!(out.status.code(), Some(0));
+        text(&out.stderr)
+    };
+    assert!(!run("5").contains("earlier run"));
+    let told = run("3");
+    assert!(told.contains("4 files from frame_00004 on are of an earlier run"), "{told}");
+    assert!(dir.join("o/frame_00005.vtk").exists());
+}
+
 #[test]
 fn a_run_is_quiet_in_a_pipe_and_repeats_to_the_last_bit() {
     let dir = folder("quiet");

@@ -97,6 +97,12 @@ pub fn at(path: &Path) -> impl Fn(io::Error) -> Error {
     move |source| Error::Io { path: path.display().to_string(), source }
 }
 
+/// How many files of frames from this one on there are without a gap: those of an earlier, longer run.
+pub fn frames_from(folder: &Path, frame: u64) -> usize {
+    let files = |extension| (frame..).take_while(|f| frame_path(folder, *f, extension).exists()).count();
+    ["png", "ply", "vtk"].into_iter().map(files).sum()
+}
+
 /// `frame_00042.png`
 fn frame_path(folder: &Path, frame: u64, extension: &str) -> PathBuf {
     folder.join(format!("frame_{frame:05}.{extension}"))
