@@ -23,6 +23,8 @@ const CORNERS: usize = 8;
 type Corners = [f32; CORNERS];
 /// Elements summed as one job.
 const JOB: usize = 8;
+/// Errors so much smaller than their mean may be those of rounding: in water that begins to fall these would say who takes part.
+pub const NOISE: f32 = 0.01;
 /// Most rounds of conjugate gradients.
 pub const ROUNDS: u32 = 40;
 /// The part of the residual's square they end at.

@@ -122,8 +122,7 @@ fn coarse_occupied(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups)
   seats[k] = seat;
 }
 
-// 1 for a particle whose share takes part, else 0. Errors so much smaller than their mean may be those of rounding.
-const NOISE: f32 = 0.01;
+// 1 for a particle whose share takes part, else 0.
 fn takes_part(i: u32) -> f32 { return select(0.0, 1.0, work[i].w + work[i].x > 0.0 || remains[i] > NOISE * solve.residual); }
 
 // Accelerations of fluids by shares that are 1; w: how much of a gradient the sum over fluids finds, 1 amid them.

@@ -12,6 +12,19 @@ use crate::laws::implicit;
 use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
 
+/// How often PBF finds the vectors to neighbours anew in a step.
+pub const TURNS: u32 = 3;
+/// The part of the tolerance at which its rounds end before.
+pub const FIRST: f64 = 0.7;
+/// An error so many times the least so far says that rounds do not converge.
+pub const WORSE: f64 = 10.0;
+/// Rounds from one solve of the coarse level to the next.
+pub const EVERY: u32 = 2;
+/// The next is made if less than this part is left of what was before the last,
+pub const WORTH: f64 = 0.8;
+/// and if a weight is not held yet or, of places, if so much of the error is of one sign: errors that cancel are for rounds.
+pub const OF_ONE_SIGN: f64 = 0.05;
+
 /// Accelerations of a chunk of fluid particles (m/s^2) by the shares (Pa) of all, which are 0 for particles of bodies; `first` is the
 /// chunk's first. `hold` is the part of gravity that pairs with bodies have, see [`implicit::hold`].
 #[inline(always)]

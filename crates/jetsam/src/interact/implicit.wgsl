@@ -9,17 +9,6 @@ const OVER: u32 = 3u;
 // solve.number of DFSPH; that of PBF is its turn.
 const VELOCITIES: u32 = 0u;
 const PLACES: u32 = 1u;
-// An error so many times the least so far says that rounds do not converge.
-const WORSE: f32 = 10.0;
-// How often PBF finds the vectors to neighbours anew in a step.
-const TURNS: u32 = 3u;
-// The part of the tolerance at which its rounds end before.
-const FIRST: f32 = 0.7;
-// Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last, and
-// if a weight is not held yet or, of places, if so much of the error is of one sign: errors that cancel are for rounds.
-const EVERY: u32 = 2u;
-const WORTH: f32 = 0.8;
-const OF_ONE_SIGN: f32 = 0.05;
 
 fn in_round() -> bool { return clock.running != 0u && solve.phase == ROUNDS; }
 fn ended() -> bool { return clock.running != 0u && solve.phase == ENDING; }

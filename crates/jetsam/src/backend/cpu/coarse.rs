@@ -3,7 +3,7 @@
 use super::implicit::{Aim, Implicit};
 use super::{CHUNK, Cpu, GONE};
 use crate::integrate::Advance;
-use crate::interact::coarse::{Coarse, Felt, Input};
+use crate::interact::coarse::{Coarse, Felt, Input, NOISE};
 use crate::interact::implicit::Round;
 use crate::laws::implicit::hold_more;
 use crate::model::Model;
@@ -12,9 +12,6 @@ use fearless_simd::dispatch;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering::Relaxed;
-
-/// Errors so much smaller than their mean may be those of rounding: in water that begins to fall these would say who takes part.
-const NOISE: f32 = 0.01;
 
 /// The coarse level, and what it is made from.
 #[derive(Default)]

@@ -7,7 +7,7 @@ use super::coarse::Level;
 use super::{CHUNK, Cpu, GONE};
 use crate::integrate::{Advance, bodies};
 use crate::interact::cells::DRAINED;
-use crate::interact::implicit::{self, Round, Said, Shares};
+use crate::interact::implicit::{self, EVERY, FIRST, OF_ONE_SIGN, Round, Said, Shares, TURNS, WORSE, WORTH};
 use crate::interact::lanes::LANES;
 use crate::interact::links::{self, Links, Nodes};
 use crate::interact::neighbours::with_scratch;
@@ -20,19 +20,6 @@ use fearless_simd::dispatch;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
-
-/// How often PBF finds the vectors to neighbours anew in a step.
-const TURNS: u32 = 3;
-/// The part of the tolerance at which its rounds end before.
-const FIRST: f64 = 0.7;
-/// An error so many times the least so far says that rounds do not converge.
-const WORSE: f64 = 10.0;
-
-/// Rounds from one solve of the coarse level to the next, which is made if less than this part is left of what was before the last, and
-/// if a weight is not held yet or, of places, if so much of the error is of one sign: errors that cancel are for rounds.
-const EVERY: u32 = 2;
-const WORTH: f64 = 0.8;
-const OF_ONE_SIGN: f64 = 0.05;
 
 /// What the solvers keep between rounds, and from one step to the next.
 #[derive(Default)]

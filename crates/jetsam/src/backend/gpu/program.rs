@@ -8,10 +8,10 @@ use super::layout::BEYOND;
 use crate::gpu::Gpu;
 use crate::integrate::sleep;
 use crate::integrate::sources::Bore;
-use crate::interact::coarse;
 use crate::interact::contacts::{DEEP, HELD};
 use crate::interact::pairs::SHIFTED_ABOVE;
 use crate::interact::pressure::BELOW_SUM;
+use crate::interact::{coarse, implicit};
 use crate::laws::kernel::Kernel;
 use crate::model::{CONTACT_REACH, DtBound, Model, TANGENTIAL, TANGENTIAL_DAMPING, TRAVEL};
 use crate::scene::{
@@ -122,6 +122,11 @@ pub fn text(model: &Model) -> String {
         ("TRAVEL", TRAVEL as f32),
         ("SLEEP", s.sleep as f32),
         ("SLOW", sleep::slow(model) as f32),
+        ("FIRST", implicit::FIRST as f32),
+        ("WORSE", implicit::WORSE as f32),
+        ("WORTH", implicit::WORTH as f32),
+        ("OF_ONE_SIGN", implicit::OF_ONE_SIGN as f32),
+        ("NOISE", coarse::NOISE),
     ];
     let counts = [
         ("FLUIDS", model.fluids.len().max(1)),
@@ -136,6 +141,8 @@ pub fn text(model: &Model) -> String {
         ("HAS_JOINED", joined(model).count()),
         ("HAS_JOINTS", model.joints.len()),
         ("COARSE_ROUNDS", coarse::ROUNDS as usize),
+        ("EVERY", implicit::EVERY as usize),
+        ("TURNS", implicit::TURNS as usize),
         ("BY_SOUND", bound_code(DtBound::Sound)),
         ("BY_FORCE", bound_code(DtBound::Force)),
         ("BY_CONTACT", bound_code(DtBound::Contact)),
