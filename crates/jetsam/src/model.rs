@@ -288,7 +288,7 @@ impl Model {
     /// Whether the pairs of fluids have no laws but pressure and viscosity (E4, E5 without Mueller's form).
     pub fn plain(&self) -> bool {
         let s = &self.solver;
-        s.density == Density::Summation
+        !self.integrates_density()
             && s.viscosity != Viscosity::Mueller
             && s.xsph == 0.0
             && s.shifting == 0.0
@@ -304,6 +304,16 @@ impl Model {
     /// Whether pressure is implicit (E9): found by iteration, in steps that the flow bounds.
     pub fn implicit(&self) -> bool {
         matches!(self.solver.pressure, Pressure::Dfsph | Pressure::Pbf)
+    }
+
+    /// Whether rates of density are summed over pairs, and integrated (E1).
+    pub fn integrates_density(&self) -> bool {
+        self.solver.density == Density::Continuity && !self.implicit()
+    }
+
+    /// Whether what a sum lacked when its particle began counts as there (E1): continuity under implicit pressure.
+    pub fn remembers_lack(&self) -> bool {
+        self.solver.density == Density::Continuity && self.implicit()
     }
 
     /// Pressure up to which gravity fades out between fluids and bodies (Pa; E17): that of a support's depth.

@@ -69,7 +69,8 @@ pub struct Particles {
     pub density: Vec<f32>,
     /// Of what the forces on bodies' particles consist, from the first rigid particle on. Written by forces.
     pub touch: Vec<Touch>,
-    /// `dD/dt` one and two steps ago (1/s), fluid only; empty where densities are summed. Written by drift.
+    /// What continuity (E1) remembers, fluid only; empty where densities are summed. `dD/dt` one and two steps ago (1/s), written by
+    /// drift; with implicit pressure what the sum lacked and 1, before that is known the density it began with and 0, written by density.
     pub rate: Vec<[f32; 2]>,
     /// Velocity added by XSPH and shifting (m/s) and, last, `dD/dt` now (1/s), fluid only; empty when none of them is on.
     /// Written by forces.
@@ -117,7 +118,7 @@ impl Particles {
         self.push_before[at] = [0.0; 3];
         self.density[at] = 1.0;
         if let Some(rate) = self.rate.get_mut(at) {
-            *rate = [0.0; 2];
+            *rate = [0.0, 1.0]; // what is born lacks nothing: more comes behind it
         }
         if let Some(carry) = self.carry.get_mut(at) {
             *carry = [0.0; 4];

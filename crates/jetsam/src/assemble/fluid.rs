@@ -185,9 +185,6 @@ impl Scene {
             let message = format!("{what} goes with pressure = \"wcsph\" alone");
             self.error(key, message, "leave it out, or state pressure = \"wcsph\"")
         };
-        if s.density == Density::Continuity {
-            return Err(only("density = \"continuity\"", "solver.density"));
-        }
         if s.pressure_force == PressureForce::Mueller {
             return Err(only("pressure_force = \"mueller\"", "solver.pressure_force"));
         }
@@ -376,6 +373,14 @@ impl Scene {
         for f in &self.fluid {
             if f.viscosity > 0.0 {
                 viscous = viscous.min(s.courant_viscous * model.support.powi(2) * f.density / (4.0 * f.viscosity));
+            }
+        }
+        if model.implicit() {
+            // the artificial viscosity is bound to sound, which bounds no step now; as eta / 2 (d + 2) it acts on the pairs that approach
+            let half = 0.5 * model.support;
+            for f in &model.fluids {
+                let mu = f64::from(f.artificial) / (2.0 * (model.dimensions as f64 + 2.0));
+                viscous = viscous.min(2.0 * s.courant_viscous * half * half * f64::from(f.density) / mu);
             }
         }
         // capillary waves (Brackbill et al. 1992), in the same class as viscosity

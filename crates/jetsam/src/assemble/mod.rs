@@ -229,8 +229,8 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
     // the fluid's segment has places for fluid to come
     let room = n + if model.sources.is_empty() { 0 } else { n / 2 + 1024 };
     let total = room + bodies.record.len();
-    let integrated = model.solver.density == Density::Continuity;
-    let carried = integrated || model.solver.xsph > 0.0 || model.solver.shifting > 0.0;
+    let continuity = model.solver.density == Density::Continuity;
+    let carried = model.integrates_density() || model.solver.xsph > 0.0 || model.solver.shifting > 0.0;
     let mortal = model.fluids.iter().any(|f| f.lifetime.is_finite());
     let mut p = Particles {
         record: vec![Record::default(); total],
@@ -238,7 +238,7 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
         push_before: vec![[0.0; 3]; room],
         density: vec![1.0; room],
         touch: vec![Touch::default(); total - room],
-        rate: vec![[0.0; 2]; if integrated { room } else { 0 }],
+        rate: vec![[0.0; 2]; if continuity { room } else { 0 }],
         carry: vec![[0.0; 4]; if carried { room } else { 0 }],
         gradient: vec![[0.0; 4]; if model.wants_gradients() { room } else { 0 }],
         vorticity: vec![[0.0; 3]; if model.wants_gradients() { room } else { 0 }],
@@ -253,6 +253,9 @@ fn join(fluid: Vec<Drop>, new: Vec<NewBody>, rigid_count: usize, model: &Model) 
         model.grid.wrap(&mut x);
         p.record[i] = Record { x, volume: model.volume as f32, v, share: 0.0 };
         p.density[i] = drop.density as f32;
+        if model.remembers_lack() {
+            p.rate[i] = [drop.density as f32, 0.0];
+        }
         p.owner[i] = drop.fluid;
     }
     p.record[room..].copy_from_slice(&bodies.record);

@@ -19,7 +19,7 @@ use crate::interact::slices::Slices;
 use crate::interact::{CHUNK, boundary, density, forces, gradients, pressure};
 use crate::ledger::Ledger;
 use crate::model::Model;
-use crate::scene::{Density, Pressure};
+use crate::scene::Pressure;
 use crate::stage::Stage;
 use crate::state::{Body, Kind, Record, State};
 use fearless_simd::{Level, dispatch};
@@ -372,7 +372,7 @@ impl Cpu {
 
     fn density(&mut self, model: &Model) {
         let n = self.state.particles.count[Kind::Fluid as usize];
-        let summed = model.solver.density == Density::Continuity;
+        let summed = model.integrates_density();
         let mut slices = std::mem::take(&mut self.slices);
         let mut density = std::mem::take(if summed { &mut self.summed } else { &mut self.state.particles.density });
         slices.resize_with(n.div_ceil(CHUNK), Slices::default);
@@ -384,6 +384,10 @@ impl Cpu {
                 dispatch!(level, simd => density::fluid_chunk(simd, scratch, model, around, members, slices, density));
             });
         });
+        if model.remembers_lack() {
+            let chunks = chunks_mut!(density, ..n).zip(chunks_mut!(self.state.particles.rate, ..n));
+            chunks.for_each(|(density, memory)| density::remember(density, memory));
+        }
         self.slices = slices;
         *(if summed { &mut self.summed } else { &mut self.state.particles.density }) = density;
         self.find_bodies(model);
@@ -411,7 +415,7 @@ impl Cpu {
         let p = &mut self.state.particles;
         let fluid = p.segment(Kind::Fluid);
         // where fluids bear tension, a density that lags behind pulls them back by itself
-        if model.solver.density == Density::Continuity && !model.solver.negative_pressure {
+        if model.integrates_density() && !model.solver.negative_pressure {
             let summed = self.summed[fluid.clone()].par_chunks(CHUNK);
             chunks_mut!(p.density, fluid.clone()).zip(summed).for_each(|(d, s)| pressure::hold(d, s));
         }

@@ -60,7 +60,7 @@ fn bear(@builtin(local_invocation_index) l: u32) {
       let fluid = u32(select(b.v.w, -b.v.w - 1.0, b.v.w < 0.0));
       let density = vec4<f32>(0.0, 0.0, 0.0, 1.0);   // where it is not found anew
       drifted[at] = Drifted(vec4<f32>(place(k), m.per_cell.w), vec4<f32>(b.v.xyz, 0.0), density,
-                            vec4<f32>(0.0, 0.0, clock.time + limit, 0.0), clock.next_id + made + place_of.x, fluid, vec2<u32>(0u));
+                            vec4<f32>(0.0, 1.0, clock.time + limit, 0.0), clock.next_id + made + place_of.x, fluid, vec2<u32>(0u));
     }
     if (l == 0u && running) {
       for (var j = first; j < first + all.y; j += 1u) {

@@ -68,7 +68,7 @@ fn gather(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<
   if (kind_of(i) == FLUID) {
     before[to] = own.push;
     push[to] = own.push;
-    if (CONTINUITY || MORTAL) { rate[to] = own.rate; }
+    if (CONTINUITY || LACKS || MORTAL) { rate[to] = own.rate; }
   } else {
     slots[own.id].place = select(GONE, to, b < bins_of(RIGID) + m.cells.w);
   }

@@ -6,6 +6,7 @@
 use super::lanes::{Block, LANES, Lanes, sum};
 use super::neighbours::{Around, NeighbourChunk, Scratch};
 use super::slices::Slices;
+use crate::laws::fluid;
 use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
 use crate::scene::Coupling;
@@ -77,6 +78,17 @@ pub fn body_chunk<S: Simd>(
     chunk.find(simd, scratch, around, kind, members, |_, _, _, _| {});
 }
 
+/// Sums of fluids that remember what theirs lacked become densities. `memory` is `[D, 0]` of a particle that begins with `D`, and then
+/// `[what its sum lacked, 1]`.
+pub fn remember(density: &mut [f32], memory: &mut [[f32; 2]]) {
+    for (d, memory) in density.iter_mut().zip(memory) {
+        if memory[1] == 0.0 {
+            *memory = [fluid::lacking(memory[0], *d), 1.0];
+        }
+        *d += memory[0];
+    }
+}
+
 /// Squared distances become `w(s)`, in one flat loop: of short loops over sixteen lanes the compiler makes scalars.
 #[inline(always)]
 pub fn weigh(kernel: Kernel, inverse: f32, r_sq: &mut [f32]) {
@@ -117,4 +129,21 @@ pub fn weights(kernel: Kernel, inverse: f32, r_sq: &Lanes) -> Lanes {
     let mut w = *r_sq;
     weigh(kernel, inverse, &mut w);
     w
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a sum lacked at first is added to every later one; what it had too much is not taken off.
+    #[test]
+    fn lack_is_remembered_but_not_excess() {
+        let mut memory = [[1.0, 0.0], [1.0, 0.0], [0.75, 0.0], [0.0, 1.0]];
+        let mut density = [0.5, 1.25, 0.5, 0.5];
+        remember(&mut density, &mut memory);
+        assert_eq!(density, [1.0, 1.25, 0.75, 0.5]);
+        density = [0.75, 1.0, 0.25, 1.0];
+        remember(&mut density, &mut memory);
+        assert_eq!(density, [1.25, 1.0, 0.5, 1.0]);
+    }
 }

@@ -30,6 +30,14 @@ fn density(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3
   } else {
     push[i].w = D;
   }
+  if (LACKS) {
+    var memory = rate[i];
+    if (memory.y == 0.0) {
+      memory = vec4<f32>(lacking(memory.x, D), 1.0, memory.zw);
+      rate[i] = memory;
+    }
+    push[i].w = D + memory.x;
+  }
   before[i].w = bitcast<f32>(fluids | (all << 16u));
 }
 

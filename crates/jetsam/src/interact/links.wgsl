@@ -67,7 +67,10 @@ fn link_one(i: u32) -> f32 {
   }
   all += 2.0 * solid;
   nodes[i] = Node(vec4<f32>(all, response(dot(all, all), 1.0 / rho, pairs, m.relax.w)), vec4<f32>(pull, 1.0 / rho));
-  if (again) { push[i].w = m.kernel.x * weight; }
+  if (again) {
+    push[i].w = m.kernel.x * weight;
+    if (LACKS) { push[i].w += rate[i].x; }
+  }
   return max(push[i].w - 1.0, 0.0);
 }
 

@@ -11,7 +11,7 @@ use super::slices::Own;
 use crate::laws::fluid;
 use crate::laws::kernel::{Kernel, each_kernel};
 use crate::model::Model;
-use crate::scene::{Density, Viscosity};
+use crate::scene::Viscosity;
 use fearless_simd::Simd;
 use glam::Vec3;
 
@@ -137,7 +137,7 @@ impl<'a> Pairs<'a> {
     pub fn new(input: &Input<'a>, own: Own, fluid: bool) -> Self {
         let Input { model, mirror, gradient, owner, .. } = *input;
         let solver = &model.solver;
-        let continuity = (fluid && solver.density == Density::Continuity).then(|| {
+        let continuity = (fluid && model.integrates_density()).then(|| {
             let mut diffusion = Diffusion {
                 rate: [0.0; LANES],
                 stiffness: [0.0; LANES],

@@ -4,7 +4,7 @@
 
 use crate::laws::fluid;
 use crate::model::Model;
-use crate::scene::{Density, EquationOfState, PressureForce};
+use crate::scene::{EquationOfState, PressureForce};
 use crate::state::{Particles, Record};
 
 /// Pressure (Pa) at relative density `d` of fluid `owner`.
@@ -44,7 +44,7 @@ pub fn hold(density: &mut [f32], summed: &[f32]) {
 /// Pressure shares of a chunk of fluid particles. Where densities are integrated shares keep their sign, for density diffusion;
 /// pairs cut them off.
 pub fn chunk(model: &Model, records: &mut [Record], density: &[f32], owner: &[u32]) {
-    let integrated = model.solver.density == Density::Continuity;
+    let integrated = model.integrates_density();
     for ((r, &d), &owner) in records.iter_mut().zip(density).zip(owner) {
         let p = if integrated { of_state(model, owner, d) } else { pressure(model, owner, d) };
         match model.solver.pressure_force {

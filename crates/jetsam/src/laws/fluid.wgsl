@@ -17,6 +17,12 @@ fn density_diffusion(V_j: f32, share_i: f32, share_j: f32, weight: f32, rate: f3
   return -2.0 * rate * V_j * G * (share_j - share_i - weight * (1.0 - 3.0 * squeezed));
 }
 
+// E1, continuity under implicit pressure, whose steps are too long for rates: sums grow by the integral of the rates, so D is the sum
+// and what that lacked where the particle began, but no more than it lacked.
+fn lacking(D: f32, sum: f32) -> f32 {
+  return max(D - sum, 0.0);
+}
+
 // E3, linear: p = c^2 (rho - rho_0).  stiffness = c_0^2 rho_0 (Pa).
 fn pressure_linear(D: f32, stiffness: f32) -> f32 {
   return stiffness * (D - 1.0);

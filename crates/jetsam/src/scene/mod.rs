@@ -172,7 +172,7 @@ pub struct Solver {
     /// How density is found (E1).
     #[serde(default)]
     pub density: Density,
-    /// `delta` of density diffusion (E1), where density is integrated. 0 turns it off.
+    /// `delta` of density diffusion (E1), where density is integrated with WCSPH. 0 turns it off.
     #[serde(default = "d::density_diffusion")]
     pub density_diffusion: f64,
     /// Equation of state (E3).
@@ -299,8 +299,9 @@ pub enum Density {
     /// Summed anew each step over the neighbours: cannot drift; a free surface looks thin to it.
     #[default]
     Summation,
-    /// Integrated from the divergence of the flow, with density diffusion (delta-SPH; Antuono et al. 2012): smooth
-    /// pressures, for gauges and waves.
+    /// Integrated from the divergence of the flow: smooth pressures, for gauges and waves. With WCSPH there is density diffusion
+    /// (delta-SPH; Antuono et al. 2012). With implicit pressure integrals are exact: sums, and what these lacked at the start; surfaces
+    /// lie still.
     Continuity,
 }
 

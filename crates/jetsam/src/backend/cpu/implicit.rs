@@ -112,13 +112,14 @@ impl Cpu {
     fn compressed(&mut self, model: &Model) -> f64 {
         let (p, level) = (&mut self.state.particles, self.level);
         let n = p.count[Kind::Fluid as usize];
-        let (records, density) = (&p.record[..], &mut p.density[..n]);
+        let (records, density, lack) = (&p.record[..], &mut p.density[..n], &p.rate[..]);
         let links = self.slices.par_iter().zip(&self.implicit.links);
-        let chunks = density.par_chunks_mut(CHUNK).zip(links).map(|(density, (slices, links))| {
+        let chunks = density.par_chunks_mut(CHUNK).zip(links).enumerate().map(|(c, (density, (slices, links)))| {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => links::densities(simd, table, model, records, slices, links, density));
             });
+            density.iter_mut().zip(lack.get(c * CHUNK..).unwrap_or_default()).for_each(|(d, lack)| *d += lack[0]);
             density.iter().map(|d| f64::from((d - 1.0).max(0.0))).sum()
         });
         chunks.collect::<Vec<f64>>().iter().sum::<f64>() / n as f64

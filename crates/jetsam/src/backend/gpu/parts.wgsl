@@ -72,7 +72,7 @@ fn glide(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     p = kept_inside(p.x, p.v, m.fluids[info[i].y].mass, select(0.5, 0.1, PBF) * m.lower.w);
     if (!PBF) { own = p.said; }
     var rates = vec4<f32>(0.0);
-    if (MORTAL) { rates = rate[i]; }
+    if (LACKS || MORTAL) { rates = rate[i]; }
     // forces are found anew: in their place goes the share by which places begin at the next step
     let a = vec4<f32>(select(vec3<f32>(spot[i].w, 0.0, 0.0), p.said.xyz, PBF), push[i].w);
     drifted[i] = Drifted(vec4<f32>(p.x, r.x.w), vec4<f32>(p.v, r.v.w), a, rates, info[i].x, info[i].y, vec2<u32>(0u));

@@ -15,7 +15,7 @@ use crate::interact::{coarse, implicit};
 use crate::laws::kernel::Kernel;
 use crate::model::{CONTACT_REACH, DtBound, Model, TANGENTIAL, TANGENTIAL_DAMPING, TRAVEL};
 use crate::scene::{
-    Coupling, Damping, Density, EquationOfState, Force, Integrator, Pressure, PressureForce, Surface, Viscosity, Wall,
+    Coupling, Damping, EquationOfState, Force, Integrator, Pressure, PressureForce, Surface, Viscosity, Wall,
 };
 use glam::DVec3;
 use std::fmt::Write as _;
@@ -74,7 +74,7 @@ pub fn text(model: &Model) -> String {
     let flat = model.dimensions == 2;
     let split = if periodic[0] { 2 } else { 1 };
     let tension = model.fluids.iter().any(|f| f.cohesion > 0.0 || f.curvature > 0.0);
-    let continuity = s.density == Density::Continuity;
+    let continuity = model.integrates_density();
     let bound_code = |bound| BOUNDS.iter().position(|&b| b == bound).unwrap_or(0);
     let steady = model.dt_bounds.iter().filter(|b| !(model.implicit() && b.0 == DtBound::Contact));
     let constant = steady.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(DtBound::Frame, |b| b.0);
@@ -85,6 +85,7 @@ pub fn text(model: &Model) -> String {
         ("HAS_FLUIDS", !model.fluids.is_empty()),
         ("HAS_FLOCKS", !model.flocks.is_empty()),
         ("CONTINUITY", continuity),
+        ("LACKS", model.remembers_lack()),
         ("COUPLED_BY_PRESSURE", s.coupling == Coupling::Pressure),
         ("TAIT", s.equation_of_state == EquationOfState::Tait),
         ("NEGATIVE", s.negative_pressure),

@@ -110,7 +110,7 @@ impl Buffers {
         let all = (fluids + slots) as usize;
         let fluid_or = |wanted: bool| if wanted { fluids as usize } else { 0 };
         let continuity = model.solver.density == Density::Continuity;
-        let carried = model.solver.xsph > 0.0 || model.solver.shifting > 0.0 || continuity;
+        let carried = model.solver.xsph > 0.0 || model.solver.shifting > 0.0 || model.integrates_density();
         let mirrored = if model.no_slip { slots as usize } else { 0 };
         let rounds = |count: u32| if model.implicit() { count as usize } else { 0 };
         let make = |what: &'static str, count: usize, size: usize| storage(gpu, what, count, size);
