@@ -43,9 +43,8 @@ fn stages(c: &mut Criterion) {
         backend.upload(&model, whole.state().clone());
         let time = whole.time();
         let still = Advance { time, dt: STILL, dt_before: STILL, drag: 0.0, parts: 1 };
-        for &stage in Stage::order(solver).iter().filter(|stage| stage.evaluates(solver)) {
-            backend.run(stage, &model, still);
-        }
+        let evaluate: Vec<_> = Stage::order(solver).iter().copied().filter(|stage| stage.evaluates(solver)).collect();
+        backend.run(&evaluate, &model, still);
         let mut group = c.benchmark_group(name);
         group.sample_size(10).sampling_mode(SamplingMode::Flat);
         group.warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
@@ -57,7 +56,7 @@ fn stages(c: &mut Criterion) {
             if rounds {
                 group.bench_function(stage.name(), |b| b.iter_custom(|steps| in_steps(&mut whole, stage, steps)));
             } else {
-                group.bench_function(stage.name(), |b| b.iter(|| backend.run(black_box(stage), &model, still)));
+                group.bench_function(stage.name(), |b| b.iter(|| backend.run(&[black_box(stage)], &model, still)));
             }
         }
         group.finish();

@@ -18,7 +18,7 @@ use crate::stage::Stage;
 use crate::state::{Kind, Record, State};
 use glam::DVec3;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A world that runs.
 pub struct World {
@@ -155,11 +155,8 @@ impl World {
         let (dt, bound) = self.next_dt(longest);
         self.hold(dt);
         let advance = Advance { time: self.time, dt, dt_before: self.dt_before, drag: 0.0, parts: self.parts(dt) };
-        for &stage in self.order() {
-            let start = Instant::now();
-            self.backend.run(stage, &self.model, advance);
-            self.timers[stage as usize] += start.elapsed();
-        }
+        let stages = self.backend.run(self.order(), &self.model, advance);
+        self.order().iter().zip(stages).for_each(|(stage, time)| self.timers[*stage as usize] += time);
         self.dt_before = dt;
         self.time += dt;
         self.steps += 1;
@@ -281,9 +278,8 @@ impl World {
     /// Runs the stages that evaluate forces.
     fn evaluate(&mut self) {
         let solver = self.model.solver.pressure;
-        for &stage in self.order().iter().filter(|s| s.evaluates(solver)) {
-            self.backend.run(stage, &self.model, Advance { time: self.time, ..Advance::default() });
-        }
+        let stages: Vec<_> = self.order().iter().copied().filter(|s| s.evaluates(solver)).collect();
+        self.backend.run(&stages, &self.model, Advance { time: self.time, ..Advance::default() });
     }
 
     /// Before time begins: fluids come to rest under drag while bodies stand still.
@@ -302,9 +298,7 @@ impl World {
             let (dt, _) = self.next_dt(end - time);
             let drag = critical * if end - time > last { 0.1 } else { 0.5 };
             let advance = Advance { time: 0.0, dt, dt_before: self.dt_before, drag, parts: 1 };
-            for &stage in self.order() {
-                self.backend.run(stage, &self.model, advance);
-            }
+            self.backend.run(self.order(), &self.model, advance);
             self.dt_before = dt;
             time += dt;
         }

@@ -5,6 +5,7 @@
 
 mod coarse;
 mod contacts;
+mod crew;
 mod implicit;
 mod parts;
 
@@ -27,6 +28,7 @@ use glam::DVec3;
 use implicit::Implicit;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+use std::time::{Duration, Instant};
 
 /// The CPU backend.
 pub struct Cpu {
@@ -154,9 +156,17 @@ impl Backend for Cpu {
         self.contacts.forget();
     }
 
-    fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
-        // as one job: a thread of the pool hands out work to the others without waiting to be woken up
-        rayon::scope(|_| self.work(stage, model, advance));
+    fn run(&mut self, stages: &[Stage], model: &Model, advance: Advance) -> Vec<Duration> {
+        let p = &self.state.particles;
+        let chunks = p.count.iter().map(|n| n.div_ceil(CHUNK)).sum();
+        crew::together(chunks, || {
+            let mut run = |stage: &Stage| {
+                let start = Instant::now();
+                self.work(*stage, model, advance);
+                start.elapsed()
+            };
+            stages.iter().map(&mut run).collect()
+        })
     }
 
     fn download(&self) -> &State {
@@ -378,7 +388,7 @@ impl Cpu {
         slices.resize_with(n.div_ceil(CHUNK), Slices::default);
         density.resize(n.max(density.len()), 1.0);
         let (around, level) = (self.around(model, false), self.level);
-        slices.par_iter_mut().zip(chunks_mut!(density, ..n)).enumerate().for_each(|(c, (slices, density))| {
+        slices.par_iter_mut().zip(chunks_mut!(density, ..n)).with_max_len(1).enumerate().for_each(|(c, (slices, density))| {
             let members = c * CHUNK..((c + 1) * CHUNK).min(n);
             with_scratch(|scratch| {
                 dispatch!(level, simd => density::fluid_chunk(simd, scratch, model, around, members, slices, density));
@@ -450,16 +460,15 @@ impl Cpu {
                     boundary::chunk(simd, model, records, owner, &b.body, gravity, first + c * CHUNK, chunk, share, mirror);
                 });
             };
-            let chunks = chunks_mut!(self.share, segment.clone()).zip(neighbours).enumerate();
+            let chunks = chunks_mut!(self.share, segment.clone()).zip(neighbours).with_max_len(1).enumerate();
             if model.no_slip {
                 let mirror = chunks_mut!(self.mirror, segment.clone());
                 chunks.zip(mirror).for_each(|((c, (share, chunk)), mirror)| work(c, share, chunk, mirror));
             } else {
                 chunks.for_each(|(c, (share, chunk))| work(c, share, chunk, &mut []));
             }
-            for (record, share) in p.record[segment.clone()].iter_mut().zip(&self.share[segment]) {
-                record.share = *share;
-            }
+            let records = p.record[segment.clone()].par_iter_mut().with_min_len(CHUNK);
+            records.zip(&self.share[segment]).for_each(|(record, share)| record.share = *share);
         }
     }
 
@@ -470,7 +479,7 @@ impl Cpu {
         }
         let (records, owner, level) = (&p.record, &p.owner, self.level);
         let n = p.count[Kind::Fluid as usize];
-        chunks_mut!(p.gradient, ..n).zip(chunks_mut!(p.vorticity, ..n)).zip(&self.slices).for_each(
+        chunks_mut!(p.gradient, ..n).zip(chunks_mut!(p.vorticity, ..n)).zip(&self.slices).with_max_len(1).for_each(
             |((gradient, vorticity), slices)| {
                 dispatch!(level, simd => {
                     gradients::chunk(simd, model, records, owner, slices, gradient, vorticity);
@@ -506,7 +515,7 @@ impl Cpu {
             carry: carry.next().unwrap_or_default(),
             vorticity: vorticity.next().unwrap_or_default(),
         });
-        let chunks = out.collect::<Vec<_>>().into_par_iter().zip(&self.slices).enumerate();
+        let chunks = out.collect::<Vec<_>>().into_par_iter().zip(&self.slices).with_max_len(1).enumerate();
         chunks.for_each(|(c, (out, slices))| {
             let input = forces::Input { first: c * CHUNK, ..input };
             dispatch!(level, simd => forces::fluids(simd, input, slices, out));
@@ -582,7 +591,7 @@ impl Cpu {
         let n = fluid.len();
         self.sums.resize_with(n.div_ceil(CHUNK), Ledger::default);
         let slices = &self.slices;
-        self.sums.par_iter_mut().enumerate().for_each(|(c, sum)| {
+        self.sums.par_iter_mut().with_max_len(1).enumerate().for_each(|(c, sum)| {
             let range = c * CHUNK..((c + 1) * CHUNK).min(n);
             *sum = Ledger::default();
             let part = Part {

@@ -39,8 +39,8 @@ pub trait Backend: Send {
     fn movers(&self) -> Option<(Vec<Body>, Vec<Record>)> {
         None
     }
-    /// Runs one stage.
-    fn run(&mut self, stage: Stage, model: &Model, advance: Advance);
+    /// Runs stages, one after another; says how long each took.
+    fn run(&mut self, stages: &[Stage], model: &Model, advance: Advance) -> Vec<Duration>;
     /// Runs whole steps without the host between them; nothing where the backend or the scene does not allow that.
     fn queue(&mut self, _model: &Model, _request: Request) -> Option<Batch> {
         None

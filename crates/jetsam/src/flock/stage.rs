@@ -147,7 +147,7 @@ impl Crowd {
         };
         for (own, flock) in flocks.iter().enumerate().filter(|(own, _)| due[*own]) {
             let inside = flock.first..flock.first + self.inside[own];
-            agents.next[inside.clone()].par_chunks_mut(CHUNK).enumerate().for_each(|(c, next)| {
+            agents.next[inside.clone()].par_chunks_mut(CHUNK).with_max_len(1).enumerate().for_each(|(c, next)| {
                 let begin = inside.start + c * CHUNK;
                 let members = begin..begin + next.len();
                 with_scratch(|scratch| {

@@ -21,7 +21,7 @@ pub const SIDE: i32 = 2;
 /// Corners of an element; bit `a` of a corner's number says at which end of axis `a` it is.
 const CORNERS: usize = 8;
 type Corners = [f32; CORNERS];
-/// Elements summed as one job.
+/// At least so many elements are summed as one job, and at most twice as many.
 const JOB: usize = 8;
 /// Errors so much smaller than their mean may be those of rounding: in water that begins to fall these would say who takes part.
 pub const NOISE: f32 = 0.01;
@@ -128,7 +128,7 @@ impl Coarse {
         let (elements, nodes) = (count(|a| a.elements), count(|a| a.nodes));
         self.element.resize(elements, Element::default());
         let axis = self.axis;
-        self.element.par_iter_mut().with_min_len(JOB).enumerate().for_each(|(k, element)| {
+        self.element.par_iter_mut().with_min_len(JOB).with_max_len(2 * JOB).enumerate().for_each(|(k, element)| {
             let at = place(&axis, k);
             *element = Element { corner: corners(&axis, at), ..Element::default() };
             dispatch!(level, simd => element.sum(simd, &axis, at, &input));
@@ -206,6 +206,7 @@ impl Coarse {
         let sums: Vec<Corners> = (0..self.element.len())
             .into_par_iter()
             .with_min_len(JOB)
+            .with_max_len(2 * JOB)
             .map(|k| dispatch!(level, simd => restrict(simd, &axis, place(&axis, k), cells, records, left)))
             .collect();
         self.left.fill(0.0);

@@ -205,7 +205,8 @@ impl Kept {
         let turned = self.old.iter().any(|rows| rows.turned);
         let (old, faced) = (&self.old[..], &self.faced[..]);
         let new = New { model, reach, bodies, particles, found, asleep, faced, old, turned };
-        let each = rows.par_iter_mut().zip(&mut self.runs).zip(self.inside.par_chunks_mut(CHUNK)).enumerate();
+        let each =
+            rows.par_iter_mut().zip(&mut self.runs).zip(self.inside.par_chunks_mut(CHUNK)).with_max_len(1).enumerate();
         each.for_each(|(c, ((rows, runs), inside))| {
             new.rows(c * CHUNK, &place, rows, inside);
             new.runs(c * CHUNK, rows, runs);

@@ -98,8 +98,8 @@ fn implicit_stages_agree_in(text: &str, before: usize) {
     let solver = model.solver.pressure;
     for (advance, evaluates) in [(rest, true), (step, false)] {
         for &stage in Stage::order(solver).iter().filter(|s| !evaluates || s.evaluates(solver)) {
-            cpu.run(stage, &model, advance);
-            gpu.run(stage, &model, advance);
+            cpu.run(&[stage], &model, advance);
+            gpu.run(&[stage], &model, advance);
             assert!(gpu.fault().is_none(), "{:?}", gpu.fault());
             compare_implicit(stage, cpu.download(), gpu.download());
         }

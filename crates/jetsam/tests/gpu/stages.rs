@@ -156,8 +156,8 @@ fn stages_agree(text: &str, before: usize) {
     let step = Advance { time: world.time(), dt, dt_before: dt, drag: 0.0, parts: 1 };
     for (advance, evaluates) in [(rest, true), (step, false)] {
         for stage in Stage::WCSPH.into_iter().filter(|s| !evaluates || s.evaluates(Pressure::Wcsph)) {
-            cpu.run(stage, &model, advance);
-            gpu.run(stage, &model, advance);
+            cpu.run(&[stage], &model, advance);
+            gpu.run(&[stage], &model, advance);
             assert!(gpu.fault().is_none(), "{:?}", gpu.fault());
             if stage != Stage::Drift || !evaluates {
                 // some eighty roundings: sums of thirty pairs, in orders of their own

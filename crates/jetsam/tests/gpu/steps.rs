@@ -175,10 +175,10 @@ fn a_lost_device_is_said() {
     let mut gpu = OnGpu::open(false).unwrap_or_else(|e| panic!("{e}"));
     gpu.upload(&model, assembly.state);
     gpu.lose();
-    gpu.run(Stage::Ledger, &model, Advance::default());
+    gpu.run(&[Stage::Ledger], &model, Advance::default());
     let fault = gpu.fault().expect("a fault");
     assert!(fault.to_string().contains("lost"), "{fault}");
-    gpu.run(Stage::Density, &model, Advance::default());
+    gpu.run(&[Stage::Density], &model, Advance::default());
     assert_eq!(Trouble::Device.to_string(), "the device failed");
 }
 

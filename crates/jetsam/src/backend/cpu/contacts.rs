@@ -156,7 +156,7 @@ impl Cpu {
         let (around, level) = (self.around(model, contacts), self.level);
         let segment = self.state.particles.segment(kind);
         chunks.resize_with(segment.len().div_ceil(CHUNK), NeighbourChunk::default);
-        chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
+        chunks.par_iter_mut().with_max_len(1).enumerate().for_each(|(c, chunk)| {
             let first = segment.start + c * CHUNK;
             let members = first..(first + CHUNK).min(segment.end);
             with_scratch(|scratch| {
@@ -189,7 +189,7 @@ impl Cpu {
         let surfaces = Surfaces { solid, stirred: &self.stirred };
         let (bodies, level) = (&*b, self.level);
         let input = contacts::Input { model, bodies, surfaces, reach: *reach, dt: dt as f32 };
-        let chunks = rows.par_iter_mut().zip(&mut kept.runs).enumerate();
+        let chunks = rows.par_iter_mut().zip(&mut kept.runs).with_max_len(1).enumerate();
         chunks.filter(|(_, (rows, _))| !rows.with.is_empty()).for_each(|(c, (rows, runs))| {
             with_scratch(|scratch| {
                 let sifted = &mut scratch.sifted;
@@ -229,7 +229,7 @@ impl Cpu {
         let fields = kind == Kind::Rigid && !model.fields.is_empty();
         let push = p.push[segment.clone()].par_chunks_mut(CHUNK);
         let touch = p.touch[segment.start - rigid_first..segment.end - rigid_first].par_chunks_mut(CHUNK);
-        push.zip(touch).zip(clean).enumerate().for_each(|(c, ((push, touch), clean))| {
+        push.zip(touch).zip(clean).with_max_len(1).enumerate().for_each(|(c, ((push, touch), clean))| {
             let chunk = neighbours.get(c).unwrap_or(&dry);
             let first = first + c * CHUNK;
             if chunk.found || fields {

@@ -100,7 +100,7 @@ impl Cpu {
         let input = links::Input { model, records: &p.record, owner: &p.owner, bodies: &b.body, gravity };
         let level = self.level;
         let chunks = links.par_iter_mut().zip(nodes.par_chunks_mut(CHUNK / LANES)).zip(&self.slices);
-        chunks.for_each(|((links, nodes), slices)| {
+        chunks.with_max_len(1).for_each(|((links, nodes), slices)| {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => links::chunk(simd, table, input, slices, links, nodes));
@@ -114,14 +114,16 @@ impl Cpu {
         let n = p.count[Kind::Fluid as usize];
         let (records, density, lack) = (&p.record[..], &mut p.density[..n], &p.rate[..]);
         let links = self.slices.par_iter().zip(&self.implicit.links);
-        let chunks = density.par_chunks_mut(CHUNK).zip(links).enumerate().map(|(c, (density, (slices, links)))| {
-            with_scratch(|scratch| {
-                let table = &mut scratch.places;
-                dispatch!(level, simd => links::densities(simd, table, model, records, slices, links, density));
-            });
-            density.iter_mut().zip(lack.get(c * CHUNK..).unwrap_or_default()).for_each(|(d, lack)| *d += lack[0]);
-            density.iter().map(|d| f64::from((d - 1.0).max(0.0))).sum()
-        });
+        let chunks = density.par_chunks_mut(CHUNK).zip(links).with_max_len(1).enumerate().map(
+            |(c, (density, (slices, links)))| {
+                with_scratch(|scratch| {
+                    let table = &mut scratch.places;
+                    dispatch!(level, simd => links::densities(simd, table, model, records, slices, links, density));
+                });
+                density.iter_mut().zip(lack.get(c * CHUNK..).unwrap_or_default()).for_each(|(d, lack)| *d += lack[0]);
+                density.iter().map(|d| f64::from((d - 1.0).max(0.0))).sum()
+            },
+        );
         chunks.collect::<Vec<f64>>().iter().sum::<f64>() / n as f64
     }
 
@@ -148,7 +150,7 @@ impl Cpu {
         let (share, hold, level) = (&share[..], &hold[..], self.level);
         let fluids = flow[..hold.len()].par_chunks_mut(CHUNK);
         let chunks = fluids.zip(nodes.par_chunks(CHUNK / LANES)).zip(links).enumerate();
-        chunks.for_each(|(c, ((flow, nodes), links))| {
+        chunks.with_max_len(1).for_each(|(c, ((flow, nodes), links))| {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => implicit::accelerate(simd, table, links, nodes, share, hold, c * CHUNK, flow));
@@ -165,7 +167,7 @@ impl Cpu {
         let input = links::Input { model, records: &p.record, owner: &p.owner, bodies: &b.body, gravity };
         let (share, hold) = (&share[..hold.len()], &hold[..]);
         let out = force[segment.start - first..segment.end - first].par_chunks_mut(CHUNK);
-        out.zip(&self.neighbours[kind as usize]).enumerate().for_each(|(c, (force, chunk))| {
+        out.zip(&self.neighbours[kind as usize]).with_max_len(1).enumerate().for_each(|(c, (force, chunk))| {
             if !chunk.found {
                 return force.fill([0.0; 3]);
             }
@@ -243,7 +245,7 @@ impl Cpu {
             .zip(error.par_chunks(CHUNK).zip(base.par_chunks(CHUNK)))
             .zip(links.par_iter());
         let all = said.par_iter_mut().zip(rate.par_chunks_mut(CHUNK)).zip(shares.zip(read)).enumerate();
-        all.for_each(|(c, ((said, rate), (((share, hold), (before, left)), ((nodes, (error, base)), links))))| {
+        all.with_max_len(1).for_each(|(c, ((said, rate), (((share, hold), (before, left)), ((nodes, (error, base)), links))))| {
             with_scratch(|scratch| {
                 let table = &mut scratch.places;
                 dispatch!(level, simd => {
@@ -421,7 +423,7 @@ impl Cpu {
         }
         let flow = &flow[..];
         let read = nodes.par_chunks(CHUNK / LANES).zip(p.density[..n].par_chunks(CHUNK)).zip(links.par_iter());
-        let all = error.par_chunks_mut(CHUNK).zip(rate.par_chunks_mut(CHUNK)).zip(read).enumerate();
+        let all = error.par_chunks_mut(CHUNK).zip(rate.par_chunks_mut(CHUNK)).zip(read).with_max_len(1).enumerate();
         all.for_each(|(c, ((error, rate), ((nodes, density), links)))| {
             if aim == Aim::Velocities {
                 with_scratch(|scratch| {

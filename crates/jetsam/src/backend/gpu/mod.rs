@@ -25,6 +25,7 @@ use std::cell::RefCell;
 use std::collections::{HashMap, VecDeque};
 use std::mem::size_of;
 use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 use transfer::Buffers;
 
 /// Most steps whose statistics are kept until they come home.
@@ -210,6 +211,38 @@ impl OnGpu {
             self.clock.fastest = last.step[2];
         }
     }
+
+    fn run_one(&mut self, stage: Stage, model: &Model, advance: Advance) {
+        self.present = OnceLock::new();
+        let advance = Advance { parts: advance.parts.max(1), ..advance };
+        let order = Stage::order(model.solver.pressure);
+        if Some(&stage) == order.first() || (stage == Stage::Cells && !self.drifted) {
+            let gravity = layout::single(model.gravity_at(advance.end()), 0.0);
+            let (dt, drag) = (advance.dt as f32, advance.drag as f32);
+            let listed = self.list_births(model, advance.time, advance.end());
+            let dt_before = advance.dt_before as f32;
+            let (parts, part) = (advance.parts, advance.part() as f32);
+            let clock = Clock { dt, dt_before, drag, gravity, running: 1, own: 0, part, parts, at: 0, ..listed };
+            self.write_clock(clock);
+        }
+        // what is sorted is what has drifted: without a drift, all stay where they are
+        if stage == Stage::Cells && !self.drifted && self.clock.dt == 0.0 {
+            self.run_stage(Stage::Drift, model, Advance { dt: 0.0, ..advance });
+        }
+        self.drifted = stage == Stage::Drift || (self.drifted && stage != Stage::Cells);
+        self.run_stage(stage, model, advance);
+        if stage != Stage::Ledger {
+            return;
+        }
+        let found = self.attempt(|gpu, ready| {
+            let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 0, 1)?;
+            Ok((sums, ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1)?))
+        });
+        if let Some((sums, clock)) = found {
+            self.take(model, &sums);
+            self.settle_births(clock[0]);
+        }
+    }
 }
 
 impl Backend for OnGpu {
@@ -284,36 +317,13 @@ impl Backend for OnGpu {
         Some((bodies, fetched.1.iter().map(record).collect()))
     }
 
-    fn run(&mut self, stage: Stage, model: &Model, advance: Advance) {
-        self.present = OnceLock::new();
-        let advance = Advance { parts: advance.parts.max(1), ..advance };
-        let order = Stage::order(model.solver.pressure);
-        if Some(&stage) == order.first() || (stage == Stage::Cells && !self.drifted) {
-            let gravity = layout::single(model.gravity_at(advance.end()), 0.0);
-            let (dt, drag) = (advance.dt as f32, advance.drag as f32);
-            let listed = self.list_births(model, advance.time, advance.end());
-            let dt_before = advance.dt_before as f32;
-            let (parts, part) = (advance.parts, advance.part() as f32);
-            let clock = Clock { dt, dt_before, drag, gravity, running: 1, own: 0, part, parts, at: 0, ..listed };
-            self.write_clock(clock);
-        }
-        // what is sorted is what has drifted: without a drift, all stay where they are
-        if stage == Stage::Cells && !self.drifted && self.clock.dt == 0.0 {
-            self.run_stage(Stage::Drift, model, Advance { dt: 0.0, ..advance });
-        }
-        self.drifted = stage == Stage::Drift || (self.drifted && stage != Stage::Cells);
-        self.run_stage(stage, model, advance);
-        if stage != Stage::Ledger {
-            return;
-        }
-        let found = self.attempt(|gpu, ready| {
-            let sums = ready.buffers.fetch::<Sums>(gpu, ready.buffers.log(), 0, 1)?;
-            Ok((sums, ready.buffers.fetch::<Clock>(gpu, ready.buffers.clock(), 0, 1)?))
-        });
-        if let Some((sums, clock)) = found {
-            self.take(model, &sums);
-            self.settle_births(clock[0]);
-        }
+    fn run(&mut self, stages: &[Stage], model: &Model, advance: Advance) -> Vec<Duration> {
+        let mut run = |stage: &Stage| {
+            let start = Instant::now();
+            self.run_one(*stage, model, advance);
+            start.elapsed()
+        };
+        stages.iter().map(&mut run).collect()
     }
 
     fn queue(&mut self, model: &Model, request: Request) -> Option<Batch> {
