@@ -117,7 +117,7 @@ fn hold_hoses(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
     force -= m.fluids[owner].mass * push[i].xyz;
     impulse += m.fluids[owner].mass * (h.velocity.xyz - records[i].v.xyz);
     push[i] = vec4<f32>(0.0, 0.0, 0.0, push[i].w);
-    before[i] = vec4<f32>(0.0, 0.0, 0.0, before[i].w);
+    before[i] = vec4<f32>(0.0);
     records[i].v = vec4<f32>(h.velocity.xyz, records[i].v.w);
     if (CARRIED) { carry[i] = vec4<f32>(0.0); }
   }

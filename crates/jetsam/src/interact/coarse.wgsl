@@ -134,8 +134,8 @@ fn coarse_push(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: 
   let limit = m.upper.w * m.upper.w;
   var total = vec3<f32>(0.0);
   var spread = 0.0;
-  var near = walk(x, FLUID);
-  while (next(&near)) {
+  var near = around(i, x, FLUID);
+  while (next_around(&near)) {
     let d = wrap(spot[near.at].xyz - x);
     let r_sq = dot(d, d);
     if (r_sq >= limit) { continue; }

@@ -1,4 +1,4 @@
-// Stages `density` and `pressure`, the twins of density.rs (E1) and pressure.rs (E3).
+// Stages `density` and `pressure`, the twins of density.rs (E1) and pressure.rs (E3). The first makes lists of neighbours for the others.
 
 @compute @workgroup_size(128)
 fn density(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) l: u32) {
@@ -7,7 +7,7 @@ fn density(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3
   let x = records[i].x.xyz;
   let limit = m.upper.w * m.upper.w;
   var sum = 0.0;
-  var fluids = 0u;
+  var found = array<u32, 3>();
   var all = 0u;
   for (var kind = FLUID; kind <= STATIC; kind += 1u) {
     let counted = kind != RIGID || COUPLED_BY_PRESSURE;
@@ -17,8 +17,9 @@ fn density(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3
       let d = wrap(other.xyz - x);
       let r_sq = dot(d, d);
       if (r_sq >= limit) { continue; }
+      if (all < m.movers.y) { lists[row_of(all) + i] = near.at; }
       all += 1u;
-      fluids += select(0u, 1u, kind == FLUID);
+      found[kind] += 1u;
       let volume = select(other.w, m.per_cell.w, kind == FLUID);
       if (counted) { sum += volume * density_w(sqrt(r_sq) * m.origin.w); }
     }
@@ -38,7 +39,7 @@ fn density(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: vec3
     }
     push[i].w = D + memory.x;
   }
-  before[i].w = bitcast<f32>(fluids | (all << 16u));
+  lists[i] = min(found[0], 0xfffu) | (min(found[1], 0x3ffu) << 12u) | (min(found[2], 0x3ffu) << 22u);
 }
 
 @compute @workgroup_size(128)

@@ -67,8 +67,8 @@ fn forces_fluid(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   let limit = m.upper.w * m.upper.w;
   var sum = Pairs();
   var t = Terms(2.0 * me.viscosity, me.artificial, 1.0, me.cohesion, me.curvature);
-  var near = walk(x, FLUID);
-  while (next(&near)) {
+  var near = around(i, x, FLUID);
+  while (next_around(&near)) {
     let j = near.at;
     let other = records[j];
     let d = wrap(other.x.xyz - x);
@@ -98,8 +98,8 @@ fn forces_fluid(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n:
   var pushed = vec3<f32>(0.0);
   for (var kind = RIGID; kind <= STATIC; kind += 1u) {
     let by_springs = springs(kind, own.v.w);
-    near = walk(x, kind);
-    while (next(&near)) {
+    near = around(i, x, kind);
+    while (next_around(&near)) {
       let j = near.at;
       let other = records[j];
       let d = wrap(other.x.xyz - x);

@@ -9,8 +9,8 @@ fn gradients(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: ve
   let limit = m.upper.w * m.upper.w;
   var color = vec3<f32>(0.0);
   var curl = vec3<f32>(0.0);
-  var near = walk(own.x.xyz, FLUID);
-  while (next(&near)) {
+  var near = around(i, own.x.xyz, FLUID);
+  while (next_around(&near)) {
     let j = near.at;
     let other = records[j];
     let d = wrap(other.x.xyz - own.x.xyz);

@@ -111,8 +111,8 @@ fn rate_of(i: u32) -> f32 {
   var total = dot(nodes[i].all.xyz, flow[i].xyz);
   for (var kind = FLUID; kind <= RIGID; kind += 1u) {
     if (kind == RIGID && !COUPLED_BY_PRESSURE) { continue; }
-    var near = walk(x, kind);
-    while (next(&near)) {
+    var near = around(i, x, kind);
+    while (next_around(&near)) {
       let other = spot[near.at];
       let d = wrap(other.xyz - x);
       let r_sq = dot(d, d);
@@ -151,8 +151,8 @@ fn accelerate(@builtin(workgroup_id) g: vec3<u32>, @builtin(num_workgroups) n: v
   let own = spot[i];
   let limit = m.upper.w * m.upper.w;
   var total = vec3<f32>(0.0);
-  var near = walk(own.xyz, FLUID);
-  while (next(&near)) {
+  var near = around(i, own.xyz, FLUID);
+  while (next_around(&near)) {
     let other = spot[near.at];
     let d = wrap(other.xyz - own.xyz);
     let r_sq = dot(d, d);

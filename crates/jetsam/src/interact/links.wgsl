@@ -35,8 +35,8 @@ fn link_one(i: u32) -> f32 {
   var all = vec3<f32>(0.0);
   var pairs = 0.0;
   var weight = 0.0;
-  var near = walk(x, FLUID);
-  while (next(&near)) {
+  var near = around(i, x, FLUID);
+  while (next_around(&near)) {
     let d = wrap(records[near.at].x.xyz - x);
     let r_sq = dot(d, d);
     if (r_sq >= limit) { continue; }
@@ -51,8 +51,8 @@ fn link_one(i: u32) -> f32 {
   var pull = vec3<f32>(0.0);
   for (var kind = RIGID; kind <= STATIC; kind += 1u) {
     if (kind == RIGID && !COUPLED_BY_PRESSURE) { continue; }
-    near = walk(x, kind);
-    while (next(&near)) {
+    near = around(i, x, kind);
+    while (next_around(&near)) {
       let other = records[near.at].x;
       let d = wrap(other.xyz - x);
       let r_sq = dot(d, d);

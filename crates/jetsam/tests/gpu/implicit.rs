@@ -7,7 +7,6 @@ use crate::{Test, gpu_world, on_gpu};
 use glam::DVec3;
 use jetsam::backend::{Backend, Cpu, OnGpu};
 use jetsam::integrate::{Advance, bodies::follow};
-use jetsam::scene::Pressure;
 use jetsam::stage::Stage;
 use jetsam::state::{Kind, State};
 use jetsam::{Scene, World, state_hash};
@@ -107,10 +106,8 @@ fn implicit_stages_agree_in(text: &str, before: usize) {
         assert_eq!(a.pressure.iterations, b.pressure.iterations);
         assert_eq!(a.divergence.iterations, b.divergence.iterations);
         assert_eq!((a.fluid, a.lost, a.left, a.put_back), (b.fluid, b.lost, b.left, b.put_back));
-        // of PBF's turns the CPU keeps the lists of neighbours, the GPU looks anew
-        let bar = if solver == Pressure::Pbf { 1e-3 } else { 1e-4 };
         let near = |what: &str, a: f64, b: f64, scale: f64| {
-            assert!((a - b).abs() <= bar * scale.abs().max(1e-12), "{what}: {a} and {b}");
+            assert!((a - b).abs() <= 1e-4 * scale.abs().max(1e-12), "{what}: {a} and {b}");
         };
         near("residual of places", a.pressure.residual, b.pressure.residual, 0.1);
         near("residual of velocities", a.divergence.residual, b.divergence.residual, 0.1);

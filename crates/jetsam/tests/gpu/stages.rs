@@ -4,19 +4,20 @@ use crate::Test;
 use crate::common::scene;
 use crate::texts::{FLAT, HEAP, LAWS, TANK};
 use glam::{DVec3, Vec3};
-use jetsam::World;
 use jetsam::backend::{Backend, Cpu, OnGpu};
 use jetsam::integrate::{Advance, bodies::follow};
 use jetsam::scene::Pressure;
 use jetsam::stage::Stage;
 use jetsam::state::{Kind, Particles, State};
+use jetsam::{World, state_hash};
 
 /// The tests of this file.
 pub const TESTS: &[Test] = &tests![
     stages_agree_in_a_tank_with_bodies,
     stages_agree_with_every_law,
     stages_agree_in_two_dimensions,
-    stages_agree_in_a_heap
+    stages_agree_in_a_heap,
+    lists_without_room_are_walked
 ];
 
 /// The largest difference of vectors, as a fraction of the largest size.
@@ -183,6 +184,31 @@ fn stages_agree(text: &str, before: usize) {
         ];
         for (what, a, b, scale) in vectors {
             near(what, DVec3::distance(a, b), 0.0, 10.0 * scale);
+        }
+    }
+}
+
+/// Lists save a search and no more: without room in them, or with room for some particles' neighbours alone, every bit is the same.
+fn lists_without_room_are_walked() {
+    let implicit = format!("{TANK}\n[solver]\npressure = \"dfsph\"\n");
+    for text in [TANK, FLAT, LAWS, &implicit] {
+        let mut world = World::from_scene(&scene(text)).unwrap();
+        let dt = (0..12).map(|_| world.step(f64::INFINITY).dt).last().unwrap();
+        let (model, solver) = (world.model().clone(), world.model().solver.pressure);
+        let hash = |room: Option<u32>| {
+            let mut gpu = OnGpu::open(false).unwrap_or_else(|e| panic!("{e}"));
+            room.into_iter().for_each(|room| gpu.allow_lists_of(room));
+            gpu.upload(&model, world.state().clone());
+            for _ in 0..3 {
+                gpu.run(Stage::order(solver), &model, Advance { dt, dt_before: dt, ..Advance::default() });
+            }
+            assert!(gpu.fault().is_none(), "{:?}", gpu.fault());
+            (state_hash(gpu.download()), gpu.ledger().neighbours)
+        };
+        let listed = hash(None);
+        println!("{listed:?}");
+        for room in [0, 10, 24] {
+            assert_eq!(listed, hash(Some(room)), "room for {room}");
         }
     }
 }

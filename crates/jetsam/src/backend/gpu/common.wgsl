@@ -40,7 +40,7 @@ struct Constants {
   cells: vec4<u32>,       // cells on each axis; w: their number
   count: vec4<u32>,       // capacity of fluids, slots of rigid bodies, slots of all bodies, bodies
   more: vec4<u32>,        // parts of bodies, blocks of the scan, groups of the ledger, axes that are open (bits)
-  movers: vec4<u32>,      // bodies that have rigid slots; w: 0, which no compiler knows
+  movers: vec4<u32>,      // bodies that have rigid slots; neighbours that a list has room for; w: 0, which no compiler knows
   fluids: array<Fluid, FLUIDS>,
   fields: array<Field, FIELDS>,
   hoses: array<Hose, HOSES>,
@@ -181,7 +181,7 @@ struct Sums {
 @group(0) @binding(2) var<storage, read_write> records: array<Record>;      // sorted: fluid, rigid, static
 @group(0) @binding(3) var<storage, read_write> info: array<vec2<u32>>;      // sorted: id or slot, owner
 @group(0) @binding(4) var<storage, read_write> push: array<vec4<f32>>;      // sorted: acceleration or force; w: D of fluids, of bodies' particles 1 if stirred
-@group(0) @binding(5) var<storage, read_write> before: array<vec4<f32>>;    // acceleration a step ago; w: neighbours (bits)
+@group(0) @binding(5) var<storage, read_write> before: array<vec4<f32>>;    // acceleration a step ago
 @group(0) @binding(6) var<storage, read_write> drifted: array<Drifted>;
 @group(0) @binding(7) var<storage, read_write> starts: array<u32>;          // where cells begin, kind by kind
 @group(0) @binding(8) var<storage, read_write> counts: array<atomic<u32>>;
@@ -226,6 +226,7 @@ struct Sums {
 @group(0) @binding(46) var<storage, read_write> giving: array<Giving>;      // bodies that have rigid slots
 @group(0) @binding(47) var<storage, read_write> reach: array<atomic<i32>>;  // force and torque on each by shares on nodes, in whole numbers
 @group(0) @binding(48) var<storage, read_write> seats: array<u32>;          // by element: which it is of those, or GONE; then which those are
+@group(0) @binding(49) var<storage, read_write> lists: array<u32>;          // row by row of all fluid: how many neighbours of each kind, then their places
 
 // A flock: as flock::FlockConstants, and its clock. lead: place and velocity of its first agent.
 struct Rule {
@@ -371,6 +372,35 @@ fn next(w: ptr<function, Walk>) -> bool {
     (*w).at = run.x;
     (*w).end = run.y;
   }
+  return true;
+}
+
+// Lists of neighbours, which `density` makes of each fluid particle in the order of a walk. Where one has no room for all, they are
+// walked to anew. Who has moved since is judged where it is.
+struct Counted { fluids: u32, rigid: u32, standing: u32 }
+const FROM_LIST: i32 = -2;   // in place of a run
+fn counted(i: u32) -> Counted {
+  let all = lists[i];
+  return Counted(all & 0xfffu, (all >> 12u) & 0x3ffu, all >> 22u);
+}
+fn all_of(c: Counted) -> u32 { return c.fluids + c.rigid + c.standing; }
+fn row_of(k: u32) -> u32 { return (1u + k) * m.count.x; }
+
+// The neighbours of one kind around a fluid particle.
+fn around(i: u32, x: vec3<f32>, kind: u32) -> Walk {
+  let c = counted(i);
+  if (all_of(c) > m.movers.y) { return walk(x, kind); }
+  var first = 0u;
+  var count = c.fluids;
+  if (kind == RIGID) { first = c.fluids; count = c.rigid; }
+  if (kind == STATIC) { first = c.fluids + c.rigid; count = c.standing; }
+  return Walk(vec3<i32>(0), row_of(first) + i, FROM_LIST, 0u, row_of(first + count) + i);
+}
+fn next_around(w: ptr<function, Walk>) -> bool {
+  if ((*w).run != FROM_LIST) { return next(w); }
+  if ((*w).bins == (*w).end) { return false; }
+  (*w).at = lists[(*w).bins];
+  (*w).bins += m.count.x;
   return true;
 }
 

@@ -333,6 +333,8 @@ pub struct Sizes {
     pub occupied: u32,
     /// See there.
     pub nodes: u32,
+    /// Neighbours that the list of a fluid particle has room for.
+    pub room: u32,
 }
 
 impl Sizes {
@@ -385,7 +387,7 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         cells: [x, y, z, sizes.cells],
         count: [sizes.fluids, sizes.rigid, sizes.slots, sizes.bodies],
         more: [sizes.parts, sizes.blocks(), sizes.groups, open],
-        movers: [sizes.movers, 0, 0, 0],
+        movers: [sizes.movers, sizes.room, 0, 0],
     };
     let mut bytes = bytemuck::bytes_of(&base).to_vec();
     for f in &model.fluids {
@@ -443,6 +445,13 @@ pub fn constants(model: &Model, sizes: Sizes) -> Vec<u8> {
         bytes.extend([0; 16]);
     }
     bytes
+}
+
+/// Neighbours that lists have room for, half as many more than a full support holds; none where the device cannot hold as many as that.
+pub fn room(model: &Model, fluids: u32, most_bytes: u64) -> u32 {
+    let rows = most_bytes / (4 * u64::from(fluids.max(1)));
+    let room = (1.5 * model.full_support) as u64 + 8;
+    if rows > model.full_support as u64 { room.min(rows - 1) as u32 } else { 0 }
 }
 
 /// Most elements and nodes of the coarse level: those over the whole domain.

@@ -37,9 +37,9 @@ fn of_fluid(i: u32) -> Sums {
     s.fluids = vec4<f32>(s.outer.xyz, head * head);
   }
   s.energy = vec4<f32>(0.5 * fluid.mass * speed * speed, -fluid.mass * dot(m.gravity.xyz, r.x.xyz - m.corner.xyz), fluid.mass * s.step.w, 0.0);
-  let near = bitcast<u32>(before[i].w);
-  s.crossed.w = f32(near & 0xffffu) - 1.0;
-  if (f32(near >> 16u) >= 0.8 * m.corner.w) {
+  let near = counted(i);
+  s.crossed.w = f32(near.fluids) - 1.0;
+  if (f32(all_of(near)) >= 0.8 * m.corner.w) {
     let error = abs(a.w - 1.0);
     s.outer.w = error;
     s.total.w = error;

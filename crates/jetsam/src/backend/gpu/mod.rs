@@ -58,6 +58,8 @@ pub struct OnGpu {
     flows: Flows,
     /// Rounds that are queued for each solve of a step: a little more than steps before needed.
     rounds: [usize; SOLVES],
+    /// Most neighbours that lists may have room for.
+    most_room: u32,
 }
 
 /// Of the model's sources, what buffers and kernels were made for.
@@ -116,12 +118,19 @@ impl OnGpu {
             last: Sums::default(),
             flows: Flows::default(),
             rounds: [4; SOLVES],
+            most_room: u32::MAX,
         }
     }
 
     /// Its name and how it is reached.
     pub fn device(&self) -> String {
         format!("{} ({})", self.gpu.info.name, self.gpu.info.api)
+    }
+
+    /// As if the device had room for lists of so many neighbours of a particle only. Before anything comes to it.
+    #[doc(hidden)]
+    pub fn allow_lists_of(&mut self, neighbours: u32) {
+        self.most_room = neighbours;
     }
 
     /// As if the device were taken out.
@@ -131,7 +140,7 @@ impl OnGpu {
     }
 
     fn prepare(&mut self, model: &Model, state: &State) -> Result<(), GpuError> {
-        let (gpu, solver) = (&self.gpu, model.solver.pressure);
+        let (gpu, solver, most_room) = (&self.gpu, model.solver.pressure, self.most_room);
         let ready = gpu.attempt(|| {
             let program = Program::new(gpu, model)?;
             let most = gpu.device.limits().max_storage_buffers_per_shader_stage;
@@ -140,7 +149,7 @@ impl OnGpu {
                 return Err(gpu.refused(reason));
             }
             let (buffers, sizes) =
-                Buffers::new(gpu, model, state, LOGGED, if model.sources.is_empty() { 0 } else { LISTED })?;
+                Buffers::new(gpu, model, state, LOGGED, if model.sources.is_empty() { 0 } else { LISTED }, most_room)?;
             let groups = |over| folded(gpu, groups(over, sizes));
             // rounds name the same kernels many times
             let made = RefCell::new(HashMap::new());

@@ -344,7 +344,7 @@ mod tests {
     use crate::scene::Source;
 
     /// The text is valid for every choice of a scene, with no capability beyond the least a device has, and no kernel uses more
-    /// buffers than ten.
+    /// buffers than eleven (Vulkan's Roadmap 2022 asks for 30, Metal has 31).
     #[test]
     fn text_is_valid_for_every_choice() {
         let choices = [
@@ -374,7 +374,7 @@ mod tests {
                     matches!(variable.space, naga::AddressSpace::Storage { .. }) && !uses[*handle].is_empty()
                 });
                 let count = storage.count();
-                assert!(count <= 10, "{} uses {count} buffers", entry.name);
+                assert!(count <= 11, "{} uses {count} buffers", entry.name);
             }
         }
     }

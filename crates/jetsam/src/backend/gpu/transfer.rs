@@ -72,6 +72,7 @@ impl Buffers {
         state: &State,
         logged: usize,
         listed: usize,
+        most_room: u32,
     ) -> Result<(Self, Sizes), GpuError> {
         let p = &state.particles;
         let parts = layout::parts(state);
@@ -94,6 +95,7 @@ impl Buffers {
             elements: elements as u32,
             occupied: occupied as u32,
             nodes: nodes as u32,
+            room: layout::room(model, fluids, gpu.info.max_buffer_bytes).min(most_room),
             fluids,
             rigid,
             slots,
@@ -164,6 +166,7 @@ impl Buffers {
             make("bodies that give way", reaches.len() - 1, GIVING_BYTES)?,
             make("nodes that bodies reach", reached as usize * FELT, 4)?,
             make("places of elements", (sizes.elements + sizes.occupied) as usize, 4)?,
+            make("lists of neighbours", fluids as usize * (1 + sizes.room as usize), 4)?,
         ];
         let buffers = Self { all: buffers };
         buffers.fill(gpu, model, state, &walls, &parts, sizes);
